@@ -70,42 +70,36 @@ class ToolMotion:
         self._seat = mount_of(robot_of(config), tool) * pinocchio.SE3(
             np.eye(3), np.array(tool.ball_seat(object_of(config).radius_m))
         )
-        self._model = _model_of(robot_of(config), threading.get_ident())
+        self._model, self._data, self._order = _model_of(robot_of(config), threading.get_ident())
+        self._hand = self._model.getFrameId(robot_of(config).hand, pinocchio.BODY)
         self._offsets = joint_offsets(config)
         self._base = np.array([0.0, 0.0, config.robot.base_height_m])
 
     def place(self, position: NDArray[np.float64]) -> NDArray[np.float64]:
         """Compute the position of the seat [m], shape ``(3,)``, from positions of `Robot.joints` [rad]."""
-        model = self._model
-        pinocchio.forwardKinematics(model.model, model.data, (position + self._offsets)[model.order])
-        hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
+        pinocchio.forwardKinematics(self._model, self._data, (position + self._offsets)[self._order])
+        hand = pinocchio.updateFramePlacement(self._model, self._data, self._hand)
         place: NDArray[np.float64] = self._base + (hand * self._seat).translation
         return place
 
     def velocity(self, position: NDArray[np.float64], velocity: NDArray[np.float64]) -> NDArray[np.float64]:
         """Compute the velocity of the seat [m/s], ``(3,)``, from positions and velocities of `Robot.joints` [rad/s]."""
-        model = self._model
-        actual = position + self._offsets
-        pinocchio.forwardKinematics(model.model, model.data, actual[model.order], velocity[model.order])
-        hand = pinocchio.updateFramePlacement(model.model, model.data, model.hand)
+        model, data, actual = self._model, self._data, position + self._offsets
+        pinocchio.forwardKinematics(model, data, actual[self._order], velocity[self._order])
+        hand = pinocchio.updateFramePlacement(model, data, self._hand)
         # The velocity of the seat, first along the axes of the seat, then along those of the world.
-        along_seat = self._seat.actInv(pinocchio.getFrameVelocity(model.model, model.data, model.hand))
+        along_seat = self._seat.actInv(pinocchio.getFrameVelocity(model, data, self._hand))
         turn = pinocchio.SE3((hand * self._seat).rotation, np.zeros(3))
         velocity_in_world: NDArray[np.float64] = turn.act(along_seat).linear
         return velocity_in_world
 
 
-class _JointModel:
-    """The kinematics of all joints of a robot; `order` gives the place of each model joint in `Robot.joints`."""
-
-    def __init__(self, robot: Robot) -> None:
-        self.model = joint_model(robot)
-        self.data = self.model.createData()
-        self.order = np.array([robot.joints.index(name) for name in list(self.model.names)[1:]], dtype=np.intp)
-        self.hand = self.model.getFrameId(robot.hand, pinocchio.BODY)
-
-
 @lru_cache(maxsize=64)
-def _model_of(robot: Robot, _thread: int) -> _JointModel:
-    """Return the model that a thread keeps, as using it changes it, and making it takes a hundred times as long."""
-    return _JointModel(robot)
+def _model_of(robot: Robot, _thread: int) -> tuple[pinocchio.Model, pinocchio.Data, NDArray[np.intp]]:
+    """Return the model of all joints that a thread keeps, and the place of each joint of it in `Robot.joints`.
+
+    Using its data changes them, and making them takes a hundred times as long.
+    """
+    model = joint_model(robot)
+    order = np.array([robot.joints.index(name) for name in list(model.names)[1:]], dtype=np.intp)
+    return model, model.createData(), order

@@ -33,15 +33,12 @@ class JointTrajectory:
 
     def __post_init__(self) -> None:
         """Refuse numbers that are no motion."""
-        points, of_joints = len(self.times), (len(self.times), len(self.joints))
-        shapes = {"times": (points,), "positions": of_joints, "velocities": of_joints, "accelerations": of_joints}
-        for name, shape in shapes.items():
+        points, shape = len(self.times), (len(self.times), len(self.joints))
+        for name in ("positions", "velocities", "accelerations"):
             values = getattr(self, name)
-            if np.shape(values) != shape:
-                raise ValueError(f"{name} of a trajectory should have the shape {shape}, have {np.shape(values)}")
-            if not np.isfinite(values).all():
-                raise ValueError(f"{name} of a trajectory hold numbers that are not finite")
-        if not points or (self.times[1:] <= self.times[:-1]).any():
+            if np.shape(values) != shape or not np.isfinite(values).all():
+                raise ValueError(f"{name} of a trajectory should be finite numbers of the shape {shape}")
+        if not points or not (self.times[1:] > self.times[:-1]).all() or not np.isfinite(self.times).all():
             raise ValueError("times of a trajectory should increase")
 
     @cached_property

@@ -14,8 +14,8 @@ RIGHT = JointTrajectory(("hip", "knee"), np.arange(3.0), ZEROS, ZEROS, ZEROS)
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"positions": ZEROS[1:]}, r"positions of a trajectory should have the shape \(3, 2\), have \(2, 2\)"),
-        ({"accelerations": ZEROS * np.nan}, "accelerations of a trajectory hold numbers that are not finite"),
+        ({"positions": ZEROS[1:]}, r"positions of a trajectory should be finite numbers of the shape \(3, 2\)"),
+        ({"accelerations": ZEROS * np.nan}, "accelerations of a trajectory should be finite"),
     ],
 )
 def test_numbers_that_are_no_motion_are_refused(change: dict[str, object], said: str) -> None:
