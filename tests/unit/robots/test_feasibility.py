@@ -202,7 +202,7 @@ def test_a_posture_in_which_held_links_overlap_is_refused(reason):
 def test_the_clearance_check_agrees_with_the_distances_of_all_pairs():
     """Every pair's distance, one by one, is the reference for the pruned check."""
     model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
-    clearance = Clearance(TALOS, model, tool_of(Config()))
+    clearance = Clearance(TALOS, model, Config().tool)
     geometry = clearance.geometry
     data, shapes = model.createData(), geometry.createData()
     draw, limits = np.random.default_rng(1), joint_limits(TALOS)
