@@ -44,13 +44,6 @@ def test_the_posture_at_rest_is_within_the_limits(robot: Robot) -> None:
     assert np.all(limits.effort > 0)
 
 
-@of_every_robot
-def test_the_description_has_the_joints_and_the_hand(robot: Robot) -> None:
-    model = joint_model(robot)
-    assert set(model.names[1:]) == set(robot.joints)
-    assert model.existBodyName(robot.hand)
-
-
 def test_a_robot_without_collision_shapes_never_comes_too_close_to_itself(tmp_path: Path) -> None:
     text = re.sub("<collision>.*?</collision>", "", PLANAR_ARM.urdf_path.read_text(), flags=re.DOTALL)
     (tmp_path / "arm.urdf").write_text(text)
