@@ -192,7 +192,8 @@ class Feasibility:
             one, *_ = alike = [*group]
             rows = slice(firsts[one], firsts[alike[-1]] + counts[alike[-1]])
             efforts[rows] = (
-                dynamics.efforts(trials[one][0], tool_of(trials[one][0]), [array[rows] for array in motion]) / world[-1]
+                dynamics.compute_efforts(trials[one][0], tool_of(trials[one][0]), [array[rows] for array in motion])
+                / world[-1]
             )
         within = np.ones(len(times), np.bool_)
         for values, limit in (
@@ -231,7 +232,7 @@ class Feasibility:
         # All joints are computed, so that the numbers do not depend on which joints are locked.
         efforts = np.empty_like(positions)
         tool = tool_of(config)
-        efforts[:, columns] = self._dynamics.efforts(config, tool, [array[:, columns] for array in motion])
+        efforts[:, columns] = self._dynamics.compute_efforts(config, tool, [array[:, columns] for array in motion])
         if worst := _find_worst(efforts, limit):
             row, joint = worst
             unit = "N" if joints[joint] in self._robot.sliding else "Nm"

@@ -140,7 +140,7 @@ def _read_component(name: str, section: ComponentSection, document: Document, di
             try:
                 read_urdf_text(urdf)
             except ConfigError as error:
-                raise ConfigError([document.problem(("components", name, "urdf"), error.message)]) from error
+                raise ConfigError([document.make_problem(("components", name, "urdf"), error.message)]) from error
         node = NodeContainerConfig(**section.model_dump(include=set(NodeContainerConfig.model_fields)))
         source = ContainerSpec(section.image, None if section.command is None else tuple(section.command), node)
         return Component(name, pretty_name, "container", source, section.max_instances, urdf)
@@ -149,7 +149,7 @@ def _read_component(name: str, section: ComponentSection, document: Document, di
         load(config)
     except ConfigError as error:
         key = "config" if section.session is None else "session"
-        problem = document.problem(("components", name, key), "names a file with errors")
+        problem = document.make_problem(("components", name, key), "names a file with errors")
         raise ConfigError([problem, *error.problems], hint=error.hint) from error
     kind: Kind = "collection" if section.session is None else "session"
     return Component(name, pretty_name, kind, config, section.max_instances)

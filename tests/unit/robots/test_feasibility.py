@@ -46,7 +46,7 @@ def reason(feasibility):
 
 def efforts_of(config, motion):
     dynamics = Dynamics(TALOS, joint_model(TALOS), {})
-    efforts = dynamics.efforts(config, tool_of(config), [array[:, dynamics.columns] for array in motion])
+    efforts = dynamics.compute_efforts(config, tool_of(config), [array[:, dynamics.columns] for array in motion])
     return efforts[:, np.argsort(dynamics.columns)]
 
 
