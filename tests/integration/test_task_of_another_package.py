@@ -132,7 +132,7 @@ def test_a_dataset_of_the_task_can_be_exported_and_reported(
     assert "simulated trials of the task reach" in (tmp_path / "parquet" / "README.md").read_text()
     throwcollect("dataset", "report", reached, "--output", tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text()
-    assert "41 simulated trials of the task reach by the humanoid robot Talos" in page
+    assert "41 simulated trials of the task reach by Talos" in page
     assert "How trials end, and where failures lie" in page
     assert "Where the balls land" not in page
 

@@ -69,7 +69,7 @@ class Document:
             wrong = "the file is empty" if self._node is None else "the file should hold keys and values"
             raise ConfigError([Problem(wrong, path=path)], expected="keys such as task and sweep")
 
-    def problem(self, location: Location, sentence: str) -> Problem:
+    def make_problem(self, location: Location, sentence: str) -> Problem:
         """Make a problem with the value or the key at a location, with the line in which it stands."""
         lines = _find_lines(self._node, location)
         is_whole = len(lines) == len(location)
@@ -88,7 +88,7 @@ class Document:
             index = read_index(holder, part)
             location = (*location, index)
             holder = holder[index] if _has_item(holder, index) else None
-        return self.problem(location, problem.message)
+        return self.make_problem(location, problem.message)
 
     def validate(self, section: type[AnySection]) -> AnySection:
         """Make a section of the values; the error has all problems, in the order of their lines."""
@@ -96,7 +96,10 @@ class Document:
             made = section.model_validate(self.values, strict=True)
         except ValidationError as error:
             found = find_problems(error, section, self.values)
-            problems = [*self.problems, *(self.problem(location, sentence) for location, sentence in found.items())]
+            problems = [
+                *self.problems,
+                *(self.make_problem(location, sentence) for location, sentence in found.items()),
+            ]
             raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)) from error
         if self.problems:
             raise ConfigError(self.problems)

@@ -64,7 +64,7 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
     _find_motions(document, path.parent, robot)
     _find_bodies(document, path.parent)
     config = document.validate(Config)
-    if wrong := [document.problem(*each) for each in _find_sweep_problems(config)]:
+    if wrong := [document.make_problem(*each) for each in _find_sweep_problems(config)]:
         raise ConfigError(wrong)
     with _placing(document):
         yield config

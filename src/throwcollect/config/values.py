@@ -17,7 +17,6 @@ from throwcollect.config.schema import Config
 from throwcollect.config.section import Section
 from throwcollect.config.sensors import SensorSections
 from throwcollect.errors import ConfigError, Problem
-from throwcollect.wording import suggest
 
 AnySection = TypeVar("AnySection", bound=Section)
 _NOT_IN_NAMES = re.compile(r"[^A-Za-z0-9_]")
@@ -115,17 +114,8 @@ def reason_not_sweepable(config: Config, key: str) -> str | None:
     Numbers of the task's motion, of the ball, the scene and the motors may vary from trial to trial. The world is built
     and the recording is set up only once, so their other keys may not.
     """
-    found, (above, _, name) = {leaf.name: leaf for leaf in leaves(config)}, key.rpartition(".")
-    if key in found:
-        return _find_obstacle(config, found[key])
-    if above in found and name.isdecimal() and found[above].value is None:
-        return f"cannot be swept, as {above} is null"
-    holder: Any = config
-    for part in above.split("."):
-        holder = getattr(holder, part, None)
-    if isinstance(holder, dict):
-        return f"{above} does not name {name}{suggest(name, holder)}"
-    return unknown_key(key, sweepable_keys(config))
+    found = {leaf.name: leaf for leaf in leaves(config)}
+    return _find_obstacle(config, found[key]) if key in found else unknown_key(key, sweepable_keys(config))
 
 
 def _find_obstacle(config: Config, leaf: Leaf) -> str | None:

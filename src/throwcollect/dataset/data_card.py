@@ -44,7 +44,7 @@ def data_card(config: Config, throws: pa.Table, provenance: Provenance) -> str:
         "---\n" + to_yaml(header) + "---\n",
         f"# {config.name}",
         "",
-        f"{episodes} simulated {config.task.subject} by {robot_of(config).introduction}, each with the joint states of "
+        f"{episodes} simulated {config.task.subject} by {robot_of(config).title}, each with the joint states of "
         f"the robot and the odometry of the {config.acted_on} at {config.record.rate_hz} Hz. Made with throwcollect.",
         "",
         *outcome_lines(throws),

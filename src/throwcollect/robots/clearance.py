@@ -11,13 +11,14 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from throwcollect.config.tool_config import ToolConfig
 from throwcollect.engines.body import LinkShape
 from throwcollect.engines.engine import SceneBody
 from throwcollect.engines.pinocchio_library import pinocchio
 from throwcollect.errors import ConfigError
 from throwcollect.robots.joint_model import joint_model, mount_of, pose_of
 from throwcollect.robots.robot import Robot
-from throwcollect.robots.tools.tool import Tool
+from throwcollect.robots.tools.tool import Tool, make_tool
 
 MARGIN_M = 0.002
 """Least distance between links. On a path between two checked postures, which are 0.02 rad apart, the spoon, 1 m from
@@ -55,7 +56,7 @@ class Clearance:
         self,
         robot: Robot,
         model: pinocchio.Model,
-        tool: Tool,
+        tool: ToolConfig,
         *,
         bodies: Sequence[SceneBody] = (),
         base_height_m: float = 0.0,
@@ -69,7 +70,7 @@ class Clearance:
             names = self._links[pair.first], self._links[pair.second]
             if any(all(name.startswith(group) for name in names) for group in robot.rigid):
                 geometry.removeCollisionPair(pair)
-        self._add_tool(tool)
+        self._add_tool(make_tool(tool))
         if bodies:
             geometry.removeAllCollisionPairs()
         for body in bodies:

@@ -39,7 +39,7 @@ class Dynamics:
         self._bare_hand = self._model.inertias[self._hand].copy()
         self._damping = joint_limits(robot).damping[self.columns]
 
-    def efforts(self, config: Config, tool: Tool, motion: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    def compute_efforts(self, config: Config, tool: Tool, motion: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
         """Compute the torques that a motion of the joints of `columns` needs, with tool and ball in the hand.
 
         Returns:

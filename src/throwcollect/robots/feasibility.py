@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache, partial
 from itertools import groupby
 
 import numpy as np
@@ -70,12 +71,10 @@ class Feasibility:
         self._middle, half = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 2
         self._half = half + _POSITION_SLACK_RAD
         self._dynamics = Dynamics(self._robot, self._model, {})
-        self._locked: Mapping[str, float] = {}
-        self._free_dynamics = self._dynamics
-        self._tool_config, self._tool = config.tool.without_release(), tool_of(config)
-        check_names(config, self._robot, self._tool)
-        self._clearance = Clearance(self._robot, self._model, self._tool)
-        self._around: dict[tuple[tuple[SceneBody, ...], float], Clearance] = {}
+        check_names(config, self._robot, tool_of(config))
+        # These take long to make, and nearly all trials have the same.
+        self._make_dynamics = lru_cache(maxsize=1)(lambda locked: Dynamics(self._robot, self._model, dict(locked)))
+        self._make_clearance = lru_cache(maxsize=3)(partial(Clearance, self._robot, self._model))
 
     def check(self, config: Config, trajectory: JointTrajectory) -> str | None:
         """Explain why the robot cannot do a trial with a trajectory.
@@ -95,7 +94,7 @@ class Feasibility:
             that has to stay. For limits, it has the worst violation; for collisions, the first one.
         """
         posture = np.array(list(start_posture(config).values())) + joint_offsets(config)
-        joints, tool = self._robot.joints, self._tool_of(config)
+        joints, tool = self._robot.joints, tool_of(config)
         instants = max(_CHECKED_LEAST, math.ceil(trajectory.times[-1] * _CHECKED_HZ)) + 1
         times = np.linspace(0.0, trajectory.times[-1], instants)
         rest, offsets = np.tile(posture, (instants, 1)), joint_offsets(config)
@@ -108,8 +107,8 @@ class Feasibility:
         bodies = bodies_of(config)
         if overlap := self._find_overlap(config, tool, bodies, way[:1]):
             return overlap
-        around = self._find_around(config, tool, bodies)
-        if approach := self._clearance.first_approach(way) or (around and around.first_approach(way)):
+        approaches = (clearance.first_approach(way) for clearance in self._list_clearances(config, bodies))
+        if approach := next(filter(None, approaches), None):
             return (
                 f"{' and '.join(approach.links)} {_describe_gap(approach.distance_m)} "
                 f"at {times[rows[approach.index]]:.3f} s; they must stay {MARGIN_M * 1000:.3g} mm apart"
@@ -140,7 +139,8 @@ class Feasibility:
     def _find_feasible_alike(self, trials: Sequence[_Trial]) -> NDArray[np.bool_]:
         """Find trials that `check` surely accepts among some whose tool and bodies have the same shapes and places."""
         config = trials[0][0]
-        tool, bodies, dynamics = self._tool_of(config), bodies_of(config), self._dynamics_of_free_joints(config)
+        tool, bodies = tool_of(config), bodies_of(config)
+        dynamics = self._make_dynamics(tuple(find_locked_joints(config).items()))
         free = dynamics.columns
         offsets = np.array([joint_offsets(each) for each, _ in trials])
         postures = np.array([[*start_posture(each).values()] for each, _ in trials]) + offsets
@@ -164,7 +164,7 @@ class Feasibility:
         numbers = np.repeat(np.arange(len(trials)), np.concatenate(counts))
         there = sure[numbers]
         way, numbers = np.concatenate(ways, axis=1).compress(there, axis=1), numbers[there]
-        for clearance in filter(None, (self._clearance, self._find_around(config, tool, bodies))):
+        for clearance in self._list_clearances(config, bodies):
             sure &= clearance.find_clear(self._model_order(postures[0]), self._columns[free], way, numbers, len(trials))
         return sure
 
@@ -191,7 +191,10 @@ class Feasibility:
         for world, group in groupby(range(len(trials)), worlds.__getitem__):
             one, *_ = alike = [*group]
             rows = slice(firsts[one], firsts[alike[-1]] + counts[alike[-1]])
-            efforts[rows] = dynamics.efforts(trials[one][0], self._tool, [array[rows] for array in motion]) / world[-1]
+            efforts[rows] = (
+                dynamics.compute_efforts(trials[one][0], tool_of(trials[one][0]), [array[rows] for array in motion])
+                / world[-1]
+            )
         within = np.ones(len(times), np.bool_)
         for values, limit in (
             (motion[0] - self._middle[free], self._half),
@@ -228,8 +231,8 @@ class Feasibility:
         limit = np.where([joint in locked for joint in joints], np.inf, limits.effort * config.robot.effort_scale)
         # All joints are computed, so that the numbers do not depend on which joints are locked.
         efforts = np.empty_like(positions)
-        tool = self._tool_of(config)
-        efforts[:, columns] = self._dynamics.efforts(config, tool, [array[:, columns] for array in motion])
+        tool = tool_of(config)
+        efforts[:, columns] = self._dynamics.compute_efforts(config, tool, [array[:, columns] for array in motion])
         if worst := _find_worst(efforts, limit):
             row, joint = worst
             unit = "N" if joints[joint] in self._robot.sliding else "Nm"
@@ -244,7 +247,7 @@ class Feasibility:
         pinocchio.forwardKinematics(self._model, self._data, self._model_order(posture))
         if not starts_in_tool(config):
             return None
-        tool, radius = self._tool_of(config), object_of(config).radius_m
+        tool, radius = tool_of(config), object_of(config).radius_m
         # The last row of a rotation into world is the vertical of the world, along the axes of the frame.
         up = (self._data.oMi[self._hand] * self._hand_placement * mount_of(self._robot, tool)).rotation[2]
         slope = tool.way_out(radius, up)
@@ -257,21 +260,6 @@ class Feasibility:
             f"out, {-slope:.3g} rad downwards; up to {safe:.3g} rad, a tilt in any direction is safe"
         )
 
-    def _dynamics_of_free_joints(self, config: Config) -> Dynamics:
-        """Return the dynamics of all joints but locked ones."""
-        locked = find_locked_joints(config)
-        if locked != self._locked:
-            self._locked, self._free_dynamics = dict(locked), Dynamics(self._robot, self._model, locked)
-        return self._free_dynamics
-
-    def _tool_of(self, config: Config) -> Tool:
-        """Return the tool of a trial; if it differs from that of the previous trial, `_clearance` gets its shapes."""
-        if config.tool.without_release() != self._tool_config:
-            self._tool_config, self._tool = config.tool.without_release(), tool_of(config)
-            self._clearance = Clearance(self._robot, self._model, self._tool)
-            self._around.clear()
-        return self._tool
-
     def _find_overlap(
         self, config: Config, tool: Tool, bodies: tuple[SceneBody, ...], start: NDArray[np.float64]
     ) -> str | None:
@@ -282,22 +270,19 @@ class Feasibility:
             hand = self._data.oMi[self._hand] * self._hand_placement * mount_of(self._robot, tool)
             x, y, z = hand.act(np.array(tool.ball_seat(thing.radius_m))).tolist()
             thing = replace(thing, placement=Placement((x, y, z + config.robot.base_height_m)))
-        elif around := self._find_around(config, tool, (thing,)):
+        else:
             # Later, the robot may touch the object.
+            _, around = self._list_clearances(config, (thing,))
             approach = around.first_approach(start)
             if approach is not None and approach.distance_m < 0:
                 return f"{' and '.join(approach.links)} overlap at the start"
         return find_overlap((thing, *bodies))
 
-    def _find_around(self, config: Config, tool: Tool, bodies: tuple[SceneBody, ...]) -> Clearance | None:
-        """Return what checks the robot against bodies of a trial's scene; None if there are none."""
-        height = config.robot.base_height_m
-        if bodies and (bodies, height) not in self._around:
-            if len(self._around) > 1:
-                self._around.clear()
-            made = Clearance(self._robot, self._model, tool, bodies=bodies, base_height_m=height)
-            self._around[bodies, height] = made
-        return self._around.get((bodies, height))
+    def _list_clearances(self, config: Config, bodies: tuple[SceneBody, ...]) -> list[Clearance]:
+        """Return what checks the robot against itself, and against bodies of a scene, if there are any."""
+        tool = config.tool.without_release()
+        around = [self._make_clearance(tool, bodies=bodies, base_height_m=config.robot.base_height_m)] if bodies else []
+        return [self._make_clearance(tool), *around]
 
     def _model_order(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Put values of joints, along the last axis, into the order of the model."""

@@ -41,7 +41,6 @@ def _make_robot(keys: str) -> Robot:
     return Robot(
         name=section.name,
         title=section.name,
-        kind="the robot",
         controllers={name: tuple(joints) for name, joints in controllers.items() if isinstance(joints, list)},
         share=partial(_check_directory, Path(section.urdf).parent, section.sha256),
         package=package_of(section.name),

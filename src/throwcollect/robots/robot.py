@@ -27,8 +27,6 @@ class Robot:
     Attributes:
         name: Name of the robot in configurations, such as ``talos``.
         title: Name of the robot in sentences, such as ``Talos``.
-        kind: Words before the title where a text first mentions the robot, such as ``the humanoid robot``; empty if
-            the title is enough.
         controllers: Joint trajectory controller of each limb and its joints, in order; each joint has one. Their
             names are such as ROS allows for nodes.
         share: Returns the directory that ``package://`` paths of the description are relative to; raises `ConfigError`
@@ -63,7 +61,6 @@ class Robot:
     rest: str
     hand: str
     package: str = ""
-    kind: str = ""
     tool_pose: Placement = HERE
     open_hand: str = ""
     holding: tuple[str, ...] = ()
@@ -77,11 +74,6 @@ class Robot:
     def joints(self) -> tuple[str, ...]:
         """All joints that are commanded, in the order of every joint state and joint array."""
         return tuple(joint for joints in self.controllers.values() for joint in joints)
-
-    @property
-    def introduction(self) -> str:
-        """Kind and title, such as ``the humanoid robot Talos``."""
-        return f"{self.kind} {self.title}".lstrip()
 
     def controller_of(self, joint: str) -> str:
         """Return the name of the controller that commands a joint.

@@ -31,7 +31,6 @@ def _find_share() -> Path:
 TALOS = Robot(
     name="talos",
     title="Talos",
-    kind="the humanoid robot",
     controllers=MappingProxyType(
         {
             "arm_left_controller": _number_joints("arm_left", 7),

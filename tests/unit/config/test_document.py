@@ -67,13 +67,13 @@ def test_a_byte_order_mark_does_not_belong_to_the_first_key(read):
 )
 def test_a_problem_has_the_line_of_its_key_or_of_the_section_that_lacks_it(read, location, line):
     document = read("# comment\na:\n  b:\n    - 1\n    - c: 2\n")
-    assert document.problem(location, "wrong").line == line
+    assert document.make_problem(location, "wrong").line == line
 
 
 def test_an_override_of_a_section_removes_the_lines_of_its_old_keys(read):
     document = read("a:\n  b: {c: 1}\n")
     document.override("a.b={d: 2}")
-    assert document.problem(("a", "b", "c"), "missing").path is None
+    assert document.make_problem(("a", "b", "c"), "missing").path is None
 
 
 def test_overrides_fill_sections_that_are_left_empty(read):

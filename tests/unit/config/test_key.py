@@ -1,12 +1,8 @@
-from typing import Annotated
-
 import pytest
 
-from throwcollect.config import values
-from throwcollect.config.key import Effect, Key
+from throwcollect.config.key import Effect
 from throwcollect.config.motion import MotionFile
 from throwcollect.config.schema import Config, DynamicMovementPrimitive
-from throwcollect.config.section import Section, any_of
 from throwcollect.config.values import leaves, list_operator_keys, sweepable_keys
 
 WEIGHTS = {joint: [0.0, 1.0] for joint in Config().task.end}
@@ -64,17 +60,3 @@ def test_keys_that_name_files_or_resources_of_a_machine_are_operator_keys():
         *("robot.urdf", "robot.packages", "robot.srdf", "scene.bodies.*.file"),
         *("task.trajectory.file", "sweep.file", "run", "containers", "cluster"),
     )
-
-
-def test_operator_keys_are_found_in_sections_of_unions_and_optional_sections():
-    class Own(Section):
-        table: Annotated[str, Key(operator=True)] = ""
-
-    class Other(Section):
-        number: float = 0
-
-    class Whole(Section):
-        part: Annotated[any_of({"own": Own, "other": Other}, str), Key(Effect.TASK)] = Own()
-        maybe: Own | None = None
-
-    assert list(values._find_operator_keys(Whole)) == ["part.table", "maybe.table"]

@@ -140,18 +140,6 @@ def test_the_arm_bears_the_ball_until_the_release_alone(name: str) -> None:
     assert abs(free) < 1e-3
 
 
-def test_both_engines_with_contacts_throw_alike() -> None:
-    ends = []
-    for name in ("bullet", "mujoco"):
-        pytest.importorskip(ENGINE_PACKAGES[name].module)
-        made: Engine = load_member("engines", name)()
-        begin(made)
-        watch_throw(made)
-        ends.append(object_in(made.state.sample).position)
-        made.close()
-    assert ends[0] == pytest.approx(ends[1], abs=5e-4)
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_held_ball_spins_as_the_tool_turns(sign: float) -> None:
     half = 0.003

@@ -72,18 +72,6 @@ def test_worlds_in_several_threads_do_not_affect_each_other(each_alone: list[Wat
         assert list(pool.map(alone, range(len(TRIALS)))) == each_alone
 
 
-def test_steps_in_several_calls_give_the_same_samples_as_in_one(engine: MujocoEngine) -> None:
-    whole = Watcher()
-    engine.run(swing(600), whole)
-    begin(engine)
-    cut = Watcher()
-    for first, last in ((0, 1), (1, 138), (138, 300), (300, 333), (333, 600)):
-        cut.offset = first
-        engine.run(swing(last - first, first=first), cut)
-    assert cut.samples == whole.samples
-    assert cut.touches == whole.touches
-
-
 def test_the_ball_leaves_the_tool_only_once(engine: MujocoEngine) -> None:
     # With the default contacts of MuJoCo, the ball hops some 15 times before it leaves.
     seen = Watcher()

@@ -46,7 +46,7 @@ def reason(feasibility):
 
 def efforts_of(config, motion):
     dynamics = Dynamics(TALOS, joint_model(TALOS), {})
-    efforts = dynamics.efforts(config, tool_of(config), [array[:, dynamics.columns] for array in motion])
+    efforts = dynamics.compute_efforts(config, tool_of(config), [array[:, dynamics.columns] for array in motion])
     return efforts[:, np.argsort(dynamics.columns)]
 
 
@@ -73,14 +73,6 @@ def test_the_long_throw_is_refused_for_the_effort_that_saturated_in_the_physics(
     assert reason(LONG).startswith("arm_right_2_joint needs 23.9")
     assert reason(LONG).endswith("its limit is 22.32 Nm")
     assert shares(LONG)[1] == pytest.approx(0.79, abs=0.01)
-
-
-def test_random_throws_from_the_recommended_sweep_box_are_feasible(reason):
-    draw = np.random.default_rng(0)
-    for _ in range(50):
-        elbow, wrist, duration_s, gamma = draw.uniform([-0.95, 0.1, 0.9, 0.95], [-0.25, 0.5, 1.3, 1.3])
-        config = throw({"arm_right_4_joint": elbow, "arm_right_7_joint": wrist}, duration_s=duration_s, gamma=gamma)
-        assert reason(config) is None
 
 
 def test_a_position_beyond_the_limit_of_its_joint_is_refused(reason):
@@ -202,7 +194,7 @@ def test_a_posture_in_which_held_links_overlap_is_refused(reason):
 def test_the_clearance_check_agrees_with_the_distances_of_all_pairs():
     """Every pair's distance, one by one, is the reference for the pruned check."""
     model = pinocchio.buildModelFromUrdf(str(TALOS.urdf_path))
-    clearance = Clearance(TALOS, model, tool_of(Config()))
+    clearance = Clearance(TALOS, model, Config().tool)
     geometry = clearance.geometry
     data, shapes = model.createData(), geometry.createData()
     draw, limits = np.random.default_rng(1), joint_limits(TALOS)

@@ -24,7 +24,6 @@ from throwcollect.robots.description import physics_description
 from throwcollect.robots.joint_model import joint_model, pose_of
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.talos import TALOS
-from throwcollect.robots.tools.tool import tool_of
 from throwcollect.sim.scene import scene_of
 
 ROBOTS = TALOS.urdf_path.parents[2]
@@ -77,7 +76,7 @@ def load_everywhere(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
     """Do what a plan does with a robot: describe it, read its shapes, and load it into each engine."""
     monkeypatch.setattr(description, "find_robot", lambda _: robot)
     scene = scene_of(CONFIG, physics_description(CONFIG))
-    Clearance(robot, joint_model(robot), tool_of(CONFIG))
+    Clearance(robot, joint_model(robot), CONFIG.tool)
     for name in ("bullet", "mujoco"):
         engine = load_member("engines", name)()
         try:

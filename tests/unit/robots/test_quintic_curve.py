@@ -15,13 +15,6 @@ def rest_to_rest(start=1.1, end=2.1, duration=1.0):
     return JointTrajectory(("j",), np.array([0.0, duration]), np.array([[start], [end]]), rest, rest)
 
 
-@pytest.mark.parametrize(
-    ("time", "value"), [(0.01, 1.100010), (0.25, 1.203516), (0.5, 1.6), (0.75, 1.996484), (1.0, 2.1)]
-)
-def test_a_motion_from_rest_to_rest_has_the_positions_of_a_quintic(time, value):
-    assert sample_quintic(rest_to_rest(), np.array([time]))[0][0, 0] == pytest.approx(value, abs=5e-7)
-
-
 @settings(max_examples=60)
 @given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.lists(st.floats(0.01, 1), min_size=2, max_size=6))
 def test_polynomials_of_degree_five_are_reproduced(coefficients, spans):

@@ -14,7 +14,6 @@ from throwcollect.robots.clearance import Clearance
 from throwcollect.robots.importing import find_robot
 from throwcollect.robots.joint_model import joint_model
 from throwcollect.robots.robot import Robot, joint_limits
-from throwcollect.robots.tools.tool import tool_of
 
 sys.path.append(str(Path(__file__).parents[2] / "plugins"))
 
@@ -45,16 +44,9 @@ def test_the_posture_at_rest_is_within_the_limits(robot: Robot) -> None:
     assert np.all(limits.effort > 0)
 
 
-@of_every_robot
-def test_the_description_has_the_joints_and_the_hand(robot: Robot) -> None:
-    model = joint_model(robot)
-    assert set(model.names[1:]) == set(robot.joints)
-    assert model.existBodyName(robot.hand)
-
-
 def test_a_robot_without_collision_shapes_never_comes_too_close_to_itself(tmp_path: Path) -> None:
     text = re.sub("<collision>.*?</collision>", "", PLANAR_ARM.urdf_path.read_text(), flags=re.DOTALL)
     (tmp_path / "arm.urdf").write_text(text)
     arm = replace(PLANAR_ARM, share=lambda: tmp_path, urdf="arm.urdf", srdf=str(PLANAR_ARM.srdf_path))
-    clearance = Clearance(arm, joint_model(arm), tool_of(Config()))
+    clearance = Clearance(arm, joint_model(arm), Config().tool)
     assert clearance.first_approach(np.zeros((3, 2))) is None

@@ -45,6 +45,11 @@ from throwcollect.engines.mujoco.stepping import EMPTY, turn, write_sample
 from throwcollect.errors import ConfigError
 from throwcollect.reproducible_math import matmul
 
+# A world that diverges has samples that are not finite, which are refused. By default, MuJoCo would also write a file
+# MUJOCO_LOG.TXT into the current directory.
+if mujoco.get_mju_user_warning() is None:
+    mujoco.set_mju_user_warning(lambda _: None)
+
 _LOOP = make_loop()
 """Made when this module is imported: by the process from which simulations are forked, before they are."""
 

@@ -69,7 +69,7 @@ def render_card(source: ExportSource, layout: Layout) -> str:
         files[MOTIONS] = "the motions of the trials."
     blocks = [
         f"# {config.name}",
-        f"{len(source.table)} simulated {config.task.subject} by {robot_of(config).introduction}; "
+        f"{len(source.table)} simulated {config.task.subject} by {robot_of(config).title}; "
         f"{len(source.throws)} of them have time series, at {source.rate_hz} Hz. "
         f"Exported by throwcollect {__version__} from the dataset with the digest `{source.dataset.digest}`.",
         "\n".join(outcome_lines(source.table)),

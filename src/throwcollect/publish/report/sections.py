@@ -111,7 +111,7 @@ def report_dataset(dataset: Dataset, *, model: Path | None = None) -> Report:
     reasons = zip(*(throws[name].to_pylist() for name in ("trial", "outcome", "reason")), strict=True)
     facts = _list_facts(dataset, info)
     task, noun = _report_task(dataset, outcomes), dataset.config.task.noun
-    by = robot_of(dataset.config).introduction
+    by = robot_of(dataset.config).title
     finished = f", finished on {facts['finished'][:10]}" if "finished" in facts else ""
     return Report(
         name=info.name,

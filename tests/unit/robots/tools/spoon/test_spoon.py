@@ -72,12 +72,3 @@ def test_the_normals_of_the_walls_bound_the_tilts_at_which_the_ball_stays():
             up = tilt_up(tilt, azimuth)
             inside = all(np.linalg.det([normals[i], normals[(i + 1) % 6], up]) > 0 for i in range(6))
             assert (tool.way_out(0.025, up) > 0) == inside
-
-
-def test_the_way_out_depends_on_depth_and_floor_of_the_cup_and_on_the_ball():
-    upright = tilt_up(0.0)
-    assert Spoon(SpoonConfig(cup_depth_m=0.05)).way_out(0.025, upright) > Spoon(SpoonConfig()).way_out(0.025, upright)
-    assert Spoon(SpoonConfig()).way_out(0.1, upright) < Spoon(SpoonConfig()).way_out(0.025, upright)
-    assert Spoon(SpoonConfig(cup_floor_radius_m=0.024)).way_out(0.025, upright) > Spoon(SpoonConfig()).way_out(
-        0.025, upright
-    )
