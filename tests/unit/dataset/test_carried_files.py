@@ -15,7 +15,7 @@ from tests.unit.robots.test_body_files import write_box, write_l_shape
 
 from throwcollect import verify_dataset
 from throwcollect.config.loader import load
-from throwcollect.config.scene import FileBodyConfig, MeshConfig
+from throwcollect.config.scene import FileBodyConfig
 from throwcollect.config.values import with_sensors
 from throwcollect.dataset.derive.derivation import filter_trials, merge, render_sensors
 from throwcollect.dataset.inspect import info
