@@ -149,7 +149,7 @@ def _open(directory: Path) -> tuple[Dataset | None, list[Finding]]:
 def _check_recordings(dataset: Dataset, processes: int) -> list[_Checked]:
     """Check the recordings that the plan places trials in, in order."""
     pieces, start = list[tuple[str, int, int]](), 0
-    for name, trials in groupby(dataset["trial"].tolist(), key=lambda trial: shard_of(dataset.plan, trial)):
+    for name, trials in groupby(dataset.throws["trial"].to_pylist(), key=lambda trial: shard_of(dataset.plan, trial)):
         pieces.append((name, start, count := sum(1 for _ in trials)))
         start += count
     processes = processes if start >= _MANY_EPISODES else 1
