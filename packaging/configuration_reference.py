@@ -30,8 +30,8 @@ _INTRODUCTION = """\
 
 <!-- Printed by `python packaging/configuration_reference.py`; edit the docstrings in src/throwcollect/config. -->
 
-A configuration is a YAML 1.2 file. Every key has a default, unless it is marked as required. `throwcollect config`
-prints all keys with their values, and `throwcollect config --schema` the JSON Schema for editors. Units are part of
+A configuration is a YAML 1.2 file. Every key has a default, unless it is marked as required. `throwcollect config
+FILE` prints all keys with their values, `throwcollect config --schema` the JSON Schema for editors. Units are part of
 the names; angles are in radians. Unknown keys and values out of bounds are errors, which are reported together;
 contradictions between keys are reported once these are right.
 

@@ -124,7 +124,7 @@ class MeshConfig(FileBodyConfig):
 class UrdfConfig(FileBodyConfig):
     """The one rigid body of a URDF, whose joints have to be fixed.
 
-    Its collision shapes count, also in pictures. Its mass is `mass_kg`; those of the URDF say how it is spread, and
+    Its collision shapes count, also in pictures. Its mass is `mass_kg`; those of the URDF define how it is spread, and
     without any it is spread evenly.
     """
 
