@@ -80,7 +80,7 @@ def test_verify_finds_nothing_wrong_in_derived_datasets(home: Path) -> None:
     derived = [path.parent for path in home.rglob("sources.parquet")]
     assert {str(path.relative_to(home)) for path in derived} == {
         *("both", "short", "few"),
-        *("parts/train", "parts/test", "rings/train", "rings/test"),
+        *("parts/train", "parts/test"),
     }
     for directory in derived:
         assert verify(directory) == []

@@ -47,7 +47,7 @@ def test_the_page_is_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caps
         assert np.array_equal(picture, np.where(np.isinf(frames[0]), 0, np.rint(frames[0])))
     assert struct.unpack(">B", Path(f"{stem}depth.png").read_bytes()[24:25]) == (16,)
     front = throwcollect.load(tmp_path / "data" / "front")
-    assert [throw["digest"] for throw in front] == [throw["digest"] for throw in dataset][:4]
+    assert [throw["digest"] for throw in front] == [throw["digest"] for throw in dataset]
     assert list(front[0].sensors) == ["front"]
     eyes = throwcollect.load(tmp_path / "data" / "random")
     assert len({throw.sensors["eye"].intrinsics[0, 0] for throw in eyes}) == 4

@@ -70,13 +70,23 @@ def load_locating_errors(path: Path, overrides: Sequence[str] = ()) -> Iterator[
         yield config
 
 
-def load_sensors(path: Path) -> Mapping[str, AnySensor]:
-    """Read a file with the section `sensors` alone.
+@contextmanager
+def load_sensors(path: Path) -> Iterator[Mapping[str, AnySensor]]:
+    """Read a file with the section `sensors` alone, and add its lines to a `ConfigError` of the block.
 
     Raises:
-        ConfigError: If the file cannot be read or anything in it is wrong.
+        ConfigError: If the file cannot be read or anything in it is wrong, or the block raises one.
     """
-    return Document(path).validate(_SensorsOnly).sensors
+    document = Document(path)
+    sensors = document.validate(_SensorsOnly).sensors
+    try:
+        yield sensors
+    except ConfigError as error:
+        # Other arguments of the block are not in the file.
+        if not all(problem.key.startswith("sensors.") for problem in error.problems):
+            raise
+        with _placing(document):
+            raise
 
 
 @contextmanager

@@ -81,7 +81,8 @@ def render_sensors(
     from throwcollect.config.loader import load_sensors
     from throwcollect.dataset.derive.derivation import render_sensors as render
 
-    derived = render(directory, output, load_sensors(sensors))
+    with load_sensors(sensors) as sections:
+        derived = render(directory, output, sections)
     _show(output, derived, json=json)
 
 
