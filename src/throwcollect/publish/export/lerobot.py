@@ -28,6 +28,7 @@ from throwcollect.publish.export.images import (
     VIDEOS,
     ImageSeries,
     encode_pictures,
+    summarise_pictures,
 )
 from throwcollect.publish.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource, ThrowSeries, unit_of
@@ -142,25 +143,27 @@ def write(source: ExportSource, directory: Path) -> None:
                 columns = {name: feature.as_column() for name, feature in features.items()}
                 table_of_frames = pa.table(columns, metadata={"throwcollect.digest": source.dataset.digest})
                 own = {name: _summarise(feature.values) for name, feature in features.items()}
-                totals = {name: _combine(totals[name], each) if totals else each for name, each in own.items()}
-                rows.append(_describe_episode(own, task, number=number, first=first, chunk=chunk, file=file))
+                videos: dict[str, Any] = {}
                 seen = {name: source.look(throw.throw, name) for name in source.streams}
                 for (name, stream), series in images.items():
                     pictures = seen[name][FRAMES[stream]]
                     if stream == "depth":
                         depth_mm = np.rint(np.where(pictures < _FARTHEST_M, pictures, 0) * 1000)
                         pictures = depth_mm.astype(np.uint16)[..., np.newaxis]
-                    rows[-1] |= series.append(pictures)
+                    own[series.key] = summarise_pictures(pictures)
+                    videos |= series.append(pictures)
                     if series.in_table:
                         table_of_frames = table_of_frames.append_column(series.key, encode_pictures(pictures))
                 data.append(table_of_frames)
+                totals = {name: _combine(totals[name], each) if totals else each for name, each in own.items()}
+                row = _describe_episode(own, task, number=number, first=first, chunk=chunk, file=file)
+                rows.append(row | videos)
                 first += len(throw)
             _append_episodes(meta, rows, episodes.slice(start, len(rows)))
     entries = {name: feature.as_dict() for name, feature in features.items()}
     entries |= {series.key: series.as_feature() for series in images.values()}
     _write_json(directory / "meta" / "info.json", _describe_dataset(source, entries, frames=first, tasks=len(tasks)))
     statistics = {name: {key: values.tolist() for key, values in each.items()} for name, each in totals.items()}
-    statistics |= {series.key: series.summarise() for series in images.values()}
     _write_json(directory / "meta" / "stats.json", statistics)
     pq.write_table(_tabulate_tasks(tasks), directory / "meta" / "tasks.parquet")
 
