@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
 from contextlib import aclosing
 
 from fastapi import APIRouter, Request, Response, WebSocket
@@ -22,7 +21,7 @@ from throwcollect.serve.robot_files import (
     scene_of,
 )
 from throwcollect.serve.rosbridge_routes import Bridges, wait_for_end
-from throwcollect.serve.sockets import MAY_NOT, keep_sending
+from throwcollect.serve.sockets import MAY_NOT, keep_sending, send_all
 from throwcollect.serve.throws import hear_throws
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
@@ -80,30 +79,21 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
         run = await asyncio.to_thread(instances.get, instance)
         async with bridges.share(run) as bridge, aclosing(hear_throws(run, bridge)) as throws:
             await socket.accept()
-            await keep_sending(socket, _send_throws(socket, throws), wait_for_end(run, bridge))
+            await keep_sending(socket, send_all(socket, throws), wait_for_end(run, bridge))
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
-        await _keep_slow(socket, instances, instance, simulation)
+        # The simulation is slow as long as the client is connected; nothing is ever sent to it.
+        if not socket.state.may_change:
+            await socket.accept()
+            await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
+            return
+        run = await asyncio.to_thread(instances.get, instance)
+        lock = await asyncio.to_thread(slow_down, run, simulation)
+        try:
+            await socket.accept()
+            await keep_sending(socket, wait_for_end(run))
+        finally:
+            await asyncio.to_thread(restore_speed, run, simulation, lock)
 
     return router
-
-
-async def _keep_slow(socket: WebSocket, instances: Instances, instance: str, simulation: str) -> None:
-    """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
-    if not socket.state.may_change:
-        await socket.accept()
-        await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
-        return
-    run = await asyncio.to_thread(instances.get, instance)
-    lock = await asyncio.to_thread(slow_down, run, simulation)
-    try:
-        await socket.accept()
-        await keep_sending(socket, wait_for_end(run))
-    finally:
-        await asyncio.to_thread(restore_speed, run, simulation, lock)
-
-
-async def _send_throws(socket: WebSocket, throws: AsyncIterator[bytes]) -> None:
-    async for throw in throws:
-        await socket.send_bytes(throw)

@@ -13,7 +13,6 @@ from throwcollect.ros.graph_names import absolute_name, is_hidden
 from throwcollect.ros.message_values import plain
 from throwcollect.serve.rosbridge.calls import call_service
 from throwcollect.serve.rosbridge.client import Client
-from throwcollect.serve.rosbridge.guarded import refuse_leases
 from throwcollect.serve.rosbridge.operations import Arguments
 
 _TIMEOUT_S = 5.0
@@ -111,7 +110,6 @@ def _split_name(given: str) -> tuple[str, str]:
     if not name:
         expected = "node:parameter, such as /sim_0:ball.mass_kg"
         raise ConfigError(f"{given!r} is no name of a parameter", expected=expected)
-    refuse_leases(name)
     return absolute_name(node), name
 
 

@@ -59,7 +59,6 @@ class Requests(Client):
             "action_feedback": actions.take,
             "action_result": actions.take,
             "action_status": actions.take,
-            "status": lambda asked: _logger.info("a client reports: %s", asked.msg),
         }
 
     @property
