@@ -39,8 +39,6 @@ _EPISODES_PER_GROUP = 100
 _FARTHEST_M = 65.535
 """No depth beyond has a number of millimetres."""
 
-Frames = NDArray[np.float64]
-"""Values of one feature, shape ``(n_frames, n_components)``."""
 Statistics = dict[str, NDArray[Any]]
 """``min``, ``max``, ``mean``, ``std`` and quantiles of each component; ``count``, the number of frames."""
 
@@ -50,25 +48,23 @@ class Feature:
     """One feature of the frames of an episode.
 
     Attributes:
-        dtype: Type of its numbers, as both NumPy and Arrow call it.
-        values: Its values, rounded to this type, as statistics are those of the stored numbers.
+        values: Its values as they are stored, shape ``(n_frames, n_components)``.
         names: Names of its components; None for a scalar.
     """
 
-    dtype: str
-    values: Frames
+    values: NDArray[Any]
     names: tuple[str, ...] | None = None
 
     def as_column(self) -> pa.Array:
         """Make its column in the table of frames."""
-        flat = pa.array(self.values.astype(self.dtype).ravel())
+        flat = pa.array(self.values.ravel())
         return flat if self.names is None else pa.FixedSizeListArray.from_arrays(flat, len(self.names))
 
     def as_dict(self) -> dict[str, object]:
         """Make its entry in ``meta/info.json``."""
         names = None if self.names is None else list(self.names)
         # In LeRobot, a scalar has the shape (1,), although its column in the file is no list.
-        return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
+        return {"dtype": self.values.dtype.name, "shape": [len(self.names or ("",))], "names": names}
 
 
 def describe(source: ExportSource) -> Layout:
@@ -142,7 +138,7 @@ def write(source: ExportSource, directory: Path) -> None:
                 chunk, file = data.place()
                 columns = {name: feature.as_column() for name, feature in features.items()}
                 table_of_frames = pa.table(columns, metadata={"throwcollect.digest": source.dataset.digest})
-                own = {name: _summarise(feature.values) for name, feature in features.items()}
+                own = {name: _summarise(feature.values.astype(np.float64)) for name, feature in features.items()}
                 videos: dict[str, Any] = {}
                 seen = {name: source.look(throw.throw, name) for name in source.streams}
                 for (name, stream), series in images.items():
@@ -195,8 +191,7 @@ def _compute_features(
     goal = (f"target.{each.word.replace(' ', '_')}" for each in source.targets)
 
     def make(dtype: str, values: NDArray[Any], names: Iterable[str] | None = None) -> Feature:
-        rounded = values.astype(dtype).astype(np.float64).reshape(count, -1)
-        return Feature(dtype, rounded, None if names is None else tuple(names))
+        return Feature(values.astype(dtype).reshape(count, -1), None if names is None else tuple(names))
 
     return {
         "observation.state": make("float32", state, (*positions, *(f"{joint}.vel" for joint in joints))),
@@ -290,8 +285,8 @@ def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
     )
 
 
-def _summarise(frames: Frames) -> Statistics:
-    """Compute the statistics of frames, by the names that LeRobot gives them."""
+def _summarise(frames: NDArray[np.float64]) -> Statistics:
+    """Compute the statistics of the values of a feature, by the names that LeRobot gives them."""
     quantiles = np.quantile(frames, list(QUANTILES.values()), axis=0)
     return {
         "min": frames.min(axis=0),

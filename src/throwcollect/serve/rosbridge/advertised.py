@@ -11,8 +11,7 @@ from throwcollect.control import GoalStatus
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import Kind, absolute_name, find_interface
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.bridge import FAREWELL_S
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge import FAREWELL_S, Client
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.operations import Answer, Offer
 

@@ -13,7 +13,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, full_name
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge import Client
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.guarded import refuse_secrets
 from throwcollect.serve.rosbridge.operations import CallService, CancelGoal, SendGoal

@@ -11,8 +11,8 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, is_hidden
 from throwcollect.ros.message_values import plain
+from throwcollect.serve.rosbridge.bridge import Client
 from throwcollect.serve.rosbridge.calls import call_service
-from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.operations import Arguments
 
 _TIMEOUT_S = 5.0

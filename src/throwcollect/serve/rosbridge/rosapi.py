@@ -14,7 +14,7 @@ from throwcollect.robots.urdf import PACKAGE
 from throwcollect.ros.graph_names import absolute_name, full_name, is_hidden
 from throwcollect.ros.message_values import plain
 from throwcollect.serve.robot_files import find_mesh
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge import Client
 from throwcollect.serve.rosbridge.guarded import is_guarded
 from throwcollect.serve.rosbridge.operations import Arguments
 from throwcollect.serve.rosbridge.parameters import get_parameter, has_parameter, list_parameters, set_parameter
