@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import io
 import os
-import struct
-import zlib
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -20,6 +19,7 @@ from throwcollect.extras import lazily
 from throwcollect.publish.export.parquet import FILES_PER_CHUNK
 
 av = lazily("av")
+pillow = lazily("PIL.Image")
 
 MEGABYTES_PER_VIDEO = 200
 VIDEOS = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
@@ -118,20 +118,10 @@ def encode_pictures(pictures: Pictures) -> pa.Array:
 
 
 def _encode_png(picture: Pictures) -> bytes:
-    height, width, channels = picture.shape
-    size, kind_of_color = picture.itemsize, 2 if channels == 3 else 0
-    levels = np.ascontiguousarray(picture, f">u{size}").view(np.uint8).reshape(height, -1)
-    # Each row begins with the number of its filter; rows with 0 are as they are.
-    rows = np.pad(levels, ((0, 0), (1, 0)))
-    chunks = {
-        b"IHDR": struct.pack(">IIBBBBB", width, height, 8 * size, kind_of_color, 0, 0, 0),
-        b"IDAT": zlib.compress(rows.tobytes(), 6),
-        b"IEND": b"",
-    }
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        for kind, data in chunks.items()
-    )
+    buffer = io.BytesIO()
+    # The usual level of 6 takes twice the time for a tenth of the size.
+    pillow.fromarray(picture[..., 0] if picture.shape[-1] == 1 else picture).save(buffer, "PNG", compress_level=3)
+    return buffer.getvalue()
 
 
 def summarise_pictures(pictures: Pictures) -> dict[str, NDArray[Any]]:
