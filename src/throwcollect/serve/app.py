@@ -10,7 +10,7 @@ from fastapi.staticfiles import StaticFiles
 
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
-from throwcollect.serve.instance_routes import make_instance_routes
+from throwcollect.serve.instance_routes import make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import restore_speeds_meanwhile
 from throwcollect.serve.models import make_model_routes
@@ -41,6 +41,7 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
     for routes in (
         _make_general_routes(states, keys),
         make_instance_routes(instances, states),
+        make_log_routes(instances),
         make_dataset_routes(instances),
         make_throw_routes(instances),
         make_sensor_routes(instances),

@@ -60,7 +60,7 @@ class SettableKey(BaseModel):
 
 
 def make_instance_routes(instances: Instances, states: States) -> APIRouter:
-    """Make the routes on instances, on what a request may set for them, and on their logs and events."""
+    """Make the routes on instances, and on what a request may set for them."""
     router = APIRouter()
 
     @router.get("/components/{name}/keys")
@@ -113,6 +113,13 @@ def make_instance_routes(instances: Instances, states: States) -> APIRouter:
     def patch(instance: str, scaling: Scaling) -> InstanceState:
         """Change the number of simulations of a run."""
         return describe(instances.scale(instance, scaling.simulations))
+
+    return router
+
+
+def make_log_routes(instances: Instances) -> APIRouter:
+    """Make the routes on logs of nodes and events of runs."""
+    router = APIRouter()
 
     @router.get("/instances/{instance}/log/{node}", response_class=PlainTextResponse)
     def log(instance: str, node: str, tail: Annotated[int, Query(ge=1, le=10_000)] = 200) -> PlainTextResponse:

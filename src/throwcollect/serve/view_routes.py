@@ -8,6 +8,7 @@ from contextlib import aclosing
 from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
+from throwcollect.collect.runs.run import Run
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import restore_speed, slow_down
@@ -83,17 +84,20 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
-        # The simulation is slow as long as the client is connected; nothing is ever sent to it.
         if not socket.state.may_change:
             await socket.accept()
             await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
-            return
-        run = await asyncio.to_thread(instances.get, instance)
-        lock = await asyncio.to_thread(slow_down, run, simulation)
-        try:
-            await socket.accept()
-            await keep_sending(socket, wait_for_end(run))
-        finally:
-            await asyncio.to_thread(restore_speed, run, simulation, lock)
+        else:
+            await _keep_slow(socket, await asyncio.to_thread(instances.get, instance), simulation)
 
     return router
+
+
+async def _keep_slow(socket: WebSocket, run: Run, simulation: str) -> None:
+    """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
+    lock = await asyncio.to_thread(slow_down, run, simulation)
+    try:
+        await socket.accept()
+        await keep_sending(socket, wait_for_end(run))
+    finally:
+        await asyncio.to_thread(restore_speed, run, simulation, lock)
