@@ -13,13 +13,7 @@ from pathlib import Path
 import pytest
 
 from throwcollect.errors import WorkerError
-from throwcollect.serve.finding import (
-    Address,
-    end_server,
-    find_server,
-    make_page_address,
-    publish,
-)
+from throwcollect.serve.finding import Address, end_server, find_server, make_page_address, publish
 
 ADDRESS = Address("http://127.0.0.1:1", "full", "read-only", 1)
 
