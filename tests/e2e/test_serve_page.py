@@ -20,7 +20,10 @@ from tests.unit.serve.made_model import make_model
 from throwcollect.collect.runs.records import Records
 from throwcollect.serve.finding import find_server, make_page_address
 
-pytestmark = pytest.mark.e2e
+pytestmark = [
+    pytest.mark.e2e,
+    pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium"),
+]
 
 _SEEN = """
 (() => {
@@ -56,7 +59,6 @@ def address(tmp_path: Path) -> Iterator[str]:
         yield told["page"]
 
 
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -> None:
     # Drawing by software is slow, so the browser asks for little motion, and the replay stands still at first.
     with browse(address, width=800, height=600, features={"prefers-reduced-motion": "reduce"}) as tab:
@@ -94,7 +96,6 @@ def test_a_collection_is_started_watched_and_stopped_by_the_page(address: str) -
         assert find_own_errors(tab) == []
 
 
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_a_session_is_recorded_by_a_button(address: str) -> None:
     with browse(address, width=390, height=800, features={"prefers-reduced-motion": "reduce"}) as tab:
         load(tab)
@@ -127,7 +128,6 @@ def over(tmp_path: Path) -> Iterator[tuple[str, str]]:
         run.forget()
 
 
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_the_page_shows_the_run_that_its_address_names(address: str, over: tuple[str, str]) -> None:
     watched = "window.throwcollect?.watching.id"
     with browse(f"{address}&run={over[0]}", width=390, height=800) as tab:
@@ -159,7 +159,6 @@ _CLICK_LANDING = """
 """
 
 
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_a_landing_of_a_run_that_has_ended_is_clicked_and_its_throw_is_replayed(
     address: str, over: tuple[str, str], tmp_path: Path
 ) -> None:
@@ -200,7 +199,6 @@ _READ_HEAD = """
 """
 
 
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_the_page_shows_what_sensors_saw_and_what_another_camera_sees(
     address: str, over: tuple[str, str], tmp_path: Path
 ) -> None:
@@ -238,7 +236,6 @@ def test_the_page_shows_what_sensors_saw_and_what_another_camera_sees(
         assert find_own_errors(tab) == []
 
 
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_a_click_on_the_map_aims_with_the_chosen_model(address: str) -> None:
     with browse(address, width=390, height=800) as tab:
         load(tab)
@@ -265,7 +262,6 @@ def test_a_click_on_the_map_aims_with_the_chosen_model(address: str) -> None:
         assert find_own_errors(tab) == []
 
 
-@pytest.mark.skipif(chromium() is None, reason="needs Chromium: apt-get install chromium")
 def test_the_page_works_without_a_network(tmp_path: Path) -> None:
     unshare = ["unshare", "--net"]
     if subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode:

@@ -33,7 +33,7 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
         everything (-a --all): Runs that have ended, too.
     """
     from throwcollect.collect.runs.records import Records
-    from throwcollect.serve.finding import SERVER, find_living
+    from throwcollect.serve.finding import SERVER, find_server
 
     records = Records()
     known: list[Run] = []
@@ -44,7 +44,7 @@ def ps(*, everything: bool = False, json: JsonOption = False) -> None:
             tell(f"throwcollect: {error}")
     shown = [run for run in known if everything or run.status != "ended"]
     shown.sort(key=lambda run: run.record.started)
-    server = find_living()
+    server = find_server()
     if json:
         documents = [*map(_make_document, shown)]
         if server is not None:

@@ -68,8 +68,10 @@ def serve(
         if not json:
             tell(write_tunnel(address))
 
+    # Without a file, the catalogue is empty, and no run can be begun.
+    offered = Catalogue.read(catalogue or DEFAULT_CONFIG) if catalogue or DEFAULT_CONFIG.exists() else Catalogue({})
     serve_all(
-        Instances(Catalogue.read(catalogue) if catalogue else Catalogue.find(DEFAULT_CONFIG), datasets.absolute()),
+        Instances(offered, datasets.absolute()),
         models.absolute(),
         host=host,
         port=port,

@@ -10,14 +10,14 @@ from fastapi.staticfiles import StaticFiles
 
 from throwcollect.serve.access import Keys
 from throwcollect.serve.dataset_routes import make_dataset_routes
-from throwcollect.serve.instance_routes import make_component_routes, make_instance_routes, make_log_routes
+from throwcollect.serve.instance_routes import make_instance_routes, make_log_routes
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import restore_speeds_meanwhile
 from throwcollect.serve.models import make_model_routes
 from throwcollect.serve.problem_responses import DESCRIPTION, HANDLERS
 from throwcollect.serve.rosbridge_routes import Bridges, make_rosbridge_routes
 from throwcollect.serve.sensor_routes import make_live_sensor_routes, make_sensor_routes
-from throwcollect.serve.sockets import keep_sending
+from throwcollect.serve.sockets import keep_sending, send_all
 from throwcollect.serve.state import STATES, ComponentState, States, WholeState
 from throwcollect.serve.throw_routes import make_throw_routes
 from throwcollect.serve.view_routes import make_view_routes
@@ -40,7 +40,6 @@ def make_app(instances: Instances, models: Path, keys: Keys) -> FastAPI:
     states, bridges = States(instances.catalogue), Bridges()
     for routes in (
         _make_general_routes(states, keys),
-        make_component_routes(instances.catalogue),
         make_instance_routes(instances, states),
         make_log_routes(instances),
         make_dataset_routes(instances),
@@ -92,11 +91,7 @@ def _make_general_routes(states: States, keys: Keys) -> APIRouter:
     @router.websocket("/state")
     async def follow(socket: WebSocket) -> None:
         await socket.accept()
-        await keep_sending(socket, _send_states(socket, states))
+        frames = (STATES.dump_json(each).decode() async for each in states.follow())
+        await keep_sending(socket, send_all(socket, frames))
 
     return router
-
-
-async def _send_states(socket: WebSocket, states: States) -> None:
-    async for state in states.follow():
-        await socket.send_text(STATES.dump_json(state).decode())

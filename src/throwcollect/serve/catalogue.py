@@ -101,11 +101,6 @@ class Catalogue:
             raise NotFoundError(f"no component {name!r}{suggest(name, self.components)}", hint=hint) from None
 
     @classmethod
-    def find(cls, path: Path) -> Catalogue:
-        """Read a catalogue if the file exists; otherwise the catalogue is empty, so that no run can be begun."""
-        return cls.read(path) if path.exists() else cls({})
-
-    @classmethod
     def read(cls, path: Path) -> Catalogue:
         """Read a catalogue, or take a configuration of a collection for the only component.
 

@@ -86,7 +86,7 @@ def publish(address: Address) -> Iterator[None]:
         os.close(lock)
 
 
-def find_living() -> Address | None:
+def find_server() -> Address | None:
     """Find the server of this user, even one that does not answer; returns None if none lives."""
     # If a server was killed, another process may have got its port or pid. Only the lock proves that a server lives.
     with suppress(OSError, ValueError):
@@ -97,14 +97,14 @@ def find_living() -> Address | None:
 
 def end_server() -> Address | None:
     """End the server of this user, by force if it does not end on its own; returns None if none lives."""
-    if (address := find_living()) is None:
+    if (address := find_server()) is None:
         return None
     with suppress(ProcessLookupError):
         # If the server lives after this, the descriptor is that of its process, and of no later one with the same id.
         process = os.pidfd_open(address.pid)
         try:
             for number in (signal.SIGTERM, signal.SIGKILL):
-                if find_living() == address:
+                if find_server() == address:
                     signal.pidfd_send_signal(process, number)
                     select.select([process], [], [], _END_S)
         finally:
@@ -112,19 +112,8 @@ def end_server() -> Address | None:
     return address
 
 
-def find_server() -> Address | None:
-    """Find the server of this user; returns None if none answers."""
-    if (address := find_living()) is None:
-        return None
-    try:
-        _ask(address, "GET", "/api/v1/health")
-    except (OSError, ValueError):
-        return None
-    return address
-
-
 def ensure_server() -> Address:
-    """Find the server of this user; if there is none, start one, which outlives this process."""
+    """Find the server of this user; if none lives, start one, which outlives this process."""
     if (address := find_server()) is not None:
         return address
     log = state_directory() / _LOG
@@ -148,29 +137,21 @@ def ensure_server() -> Address:
 
 def make_page_address(address: Address, run: str | None = None) -> str:
     """Make an address of the page, on one run or all, that can be opened once, within ten minutes."""
-    try:
-        return address.page(_ask(address, "POST", "/api/v1/codes")["code"], run)
-    except (OSError, ValueError, KeyError) as error:
-        raise WorkerError(f"{address.url}: the server does not answer: {error}") from error
-
-
-def _ask(address: Address, method: str, path: str) -> dict[str, str]:
-    """Ask a server; raises an OSError or a ValueError if it does not answer as it should."""
     context = None
     if address.certificate is not None:
         # Only this one certificate is accepted, so the names in it and its issuer do not matter.
         context = ssl.create_default_context(cafile=address.certificate)
         context.check_hostname = False
         context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
-    headers = {"Authorization": f"Bearer {address.token}"}
-    request = Request(address.url + path, method=method, headers=headers)  # noqa: S310 - a server wrote the address
     # A proxy of the environment must not be asked for a server of this machine.
     opener = build_opener(ProxyHandler({}), HTTPSHandler(context=context))
+    headers = {"Authorization": f"Bearer {address.token}"}
     try:
+        request = Request(f"{address.url}/api/v1/codes", method="POST", headers=headers)  # noqa: S310 - a server wrote it
         with opener.open(request, timeout=_ANSWER_S) as answer:
-            return dict(json.loads(answer.read()))
-    except http.client.HTTPException as error:
-        raise ValueError(f"{path}: {error}") from error
+            return address.page(json.loads(answer.read())["code"], run)
+    except (OSError, ValueError, KeyError, http.client.HTTPException) as error:
+        raise WorkerError(f"{address.url}: the server does not answer: {error}") from error
 
 
 _ADDRESS = TypeAdapter(Address)

@@ -21,7 +21,7 @@ from throwcollect.config.shape import shape_of
 from throwcollect.config.values import leaves
 from throwcollect.errors import NotFoundError
 from throwcollect.files import open_log
-from throwcollect.serve.catalogue import LONGEST_NAME, Catalogue
+from throwcollect.serve.catalogue import LONGEST_NAME
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.state import InstanceState, States, describe
 from throwcollect.wording import suggest
@@ -59,14 +59,14 @@ class SettableKey(BaseModel):
     takes: str
 
 
-def make_component_routes(catalogue: Catalogue) -> APIRouter:
-    """Make the route on what a request may set for an instance of a component."""
+def make_instance_routes(instances: Instances, states: States) -> APIRouter:
+    """Make the routes on instances, and on what a request may set for them."""
     router = APIRouter()
 
     @router.get("/components/{name}/keys")
     def keys(name: str) -> list[SettableKey]:
         """Keys that a request may set for an instance of a component; none for a container."""
-        source = catalogue.get(name).source
+        source = instances.catalogue.get(name).source
         found = leaves(load(source)) if isinstance(source, Path) else ()
         # An item of a list is set with the whole list.
         return [
@@ -75,17 +75,10 @@ def make_component_routes(catalogue: Catalogue) -> APIRouter:
             if not leaf.key.operator and not any(part.isdecimal() for part in leaf.name.split("."))
         ]
 
-    return router
-
-
-def make_instance_routes(instances: Instances, states: States) -> APIRouter:
-    """Make the routes on instances."""
-    router = APIRouter()
-
     @router.get("/instances")
-    def all_instances() -> list[InstanceState]:
-        """All runs that this machine remembers, the latest first."""
-        return states.list_instances()
+    async def all_instances() -> list[InstanceState]:
+        """The runs of the state."""
+        return (await states.read()).instances
 
     @router.get("/instances/{instance}")
     def one(instance: str) -> InstanceState:

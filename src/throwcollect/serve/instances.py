@@ -17,7 +17,7 @@ from throwcollect.collect.runs import control
 from throwcollect.collect.runs.background import begin_container, begin_run
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
-from throwcollect.collect.runs.run_selection import require_living, require_simulations
+from throwcollect.collect.runs.run_selection import refuse_busy, require_living, require_simulations
 from throwcollect.collect.runtimes.run_record import Origin
 from throwcollect.config.loader import load
 from throwcollect.config.run import ContainerSpec
@@ -34,7 +34,6 @@ from throwcollect.serve.state import explain_refusal, simulations_of
 _KEY = r"[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*"
 _ONE_AT_A_TIME = threading.Lock()
 """Held while an instance is begun or stopped, so that several requests together do not begin one too many."""
-_LOOK_S = 0.02
 _LONGEST_STOP_S = 2.0
 """Longest wait for a launcher to write into its record that it is stopping."""
 
@@ -96,9 +95,7 @@ class Instances:
         with _ONE_AT_A_TIME:
             if (reason := explain_refusal(run.now())) is not None:
                 raise ConflictError(reason)
-            for other in Records().into(run.record.directory):
-                if other.status == "running":
-                    raise ConflictError(f"run {other.id} collects into the dataset of run {run.id}")
+            refuse_busy(run.record.directory)
             if origin is not None and origin.component in self.catalogue.components:
                 _check_room(self.catalogue.get(origin.component))
             config = config_path(run.record.directory)
@@ -117,12 +114,9 @@ class Instances:
         with _ONE_AT_A_TIME:
             now = run.now()
             if not (now.lives and now.record.stopping):
-                control.stop(now, keep_on=lambda: False)
-            # A second signal would hurry the run, so this waits until its launcher has written that it is stopping.
-            deadline = time.monotonic() + _LONGEST_STOP_S
-            while now.lives and not now.record.stopping and time.monotonic() < deadline:
-                time.sleep(_LOOK_S)
-                now = run.now()
+                # A second signal would hurry the run, so this waits until its launcher has written that it is stopping.
+                deadline = time.monotonic() + _LONGEST_STOP_S
+                control.stop(now, keep_on=lambda: not run.now().record.stopping and time.monotonic() < deadline)
 
     def scale(self, instance: str, simulations: int) -> Run:
         """Ask an instance for another number of simulations."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +12,7 @@ from pydantic import BaseModel
 
 from throwcollect.errors import NotFoundError
 from throwcollect.learning.adapting import Adaptation
-from throwcollect.learning.model import MODEL, POINTS, Model, load_model, read_score
+from throwcollect.learning.model import MODEL, Model, load_model, read_score
 from throwcollect.learning.score import Score
 from throwcollect.serve.catalogue import ENTRY
 
@@ -95,12 +94,4 @@ def _is_model(directory: Path, name: str) -> bool:
 def _find(directory: Path, name: str) -> Model:
     if not _is_model(directory, name):
         raise NotFoundError(f"no model {name!r}", hint=f"throwcollect fit makes models; they belong in {directory}")
-    changed = [
-        path.stat().st_mtime_ns for path in (directory / name / MODEL, directory / name / POINTS) if path.exists()
-    ]
-    return _load(directory / name, *changed)
-
-
-@lru_cache(maxsize=8)
-def _load(directory: Path, *_changed_ns: int) -> Model:
-    return load_model(directory)
+    return load_model(directory / name)

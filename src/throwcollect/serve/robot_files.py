@@ -25,9 +25,8 @@ from throwcollect.robots.surroundings import BodyLook, looks_of
 
 _MESH = re.compile(r"package://([\w.-]+)/([^\"'<>]+)")
 """URL of a mesh in a description: its package, and its path in that package."""
-_KINDS = ".stl", ".dae", ".obj"
 _carried: dict[str, Path] = {}
-"""Files of robots that datasets of runs carry, by name."""
+"""Files of robots that datasets of runs carry, by their names without ending."""
 
 
 def description_of(run: Run) -> str:
@@ -91,26 +90,21 @@ def find_mesh(package: str, path: str) -> Path:
             file = (root / path).resolve(strict=True)
             if file.is_relative_to(root.resolve()) and file.is_file():
                 return file
-    if root is None and (found := _find_carried(path)) is not None:
+    if root is None and (found := _find_carried(path.partition(".")[0])) is not None and found.name == path:
         return found
     raise NotFoundError(f"no mesh package://{package}/{path}")
 
 
-def _find_carried(*names: str) -> Path | None:
-    """Find a mesh that a dataset of a run carries; it does not matter which one, as names are made of contents."""
-    if not any(name in _carried and _carried[name].is_file() for name in names):
-        _look_for_carried()
-    return next((file for name in names if (file := _carried.get(name)) is not None and file.is_file()), None)
-
-
-def _look_for_carried() -> None:
-    for run in Records().all():
-        with suppress(OSError):
-            directory = run.record.directory.resolve(strict=True)
-            for name in list_carried(directory):
+def _find_carried(stem: str) -> Path | None:
+    """Find a mesh that a dataset of a run carries, by its name without ending, which is made of its content."""
+    if stem not in _carried or not _carried[stem].is_file():
+        for run in Records().all():
+            with suppress(OSError):
+                directory = run.record.directory.resolve(strict=True)
                 # A link may lead out of the directory.
-                if (file := directory / name).resolve() == file:
-                    _carried[file.name] = file
+                files = (directory / name for name in list_carried(directory))
+                _carried.update({file.stem: file for file in files if file.resolve() == file})
+    return _carried.get(stem)
 
 
 @dataclass(frozen=True)
@@ -140,7 +134,7 @@ def list_meshes(description: str) -> list[MeshFile]:
 def find_mesh_by_content(sha256: str) -> Path:
     """Find the file of a mesh of one of the robots by the SHA-256 of its content, in hexadecimal."""
     known = [file for text, _ in _read_descriptions() for _, _, file in _find_files(text)]
-    carried = _find_carried(*(f"{sha256[:16]}{kind}" for kind in _KINDS))
+    carried = _find_carried(sha256[:16])
     for file in [*known, *([carried] if carried else [])]:
         if _digest(file, file.stat().st_mtime_ns) == sha256:
             return file

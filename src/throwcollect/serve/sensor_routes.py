@@ -6,7 +6,7 @@ import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from threading import Lock
 from typing import Annotated, Any
 
@@ -42,6 +42,8 @@ _ANSWER_S = 30.0
 """The first request for the sensors of a simulation starts the node that renders them."""
 _Section = Annotated[dict[str, Any], Body()]
 _Sections = dict[str, dict[str, Any]]
+_OpenThrow = tuple[Config, Samples, dict[str, SensorFrames], Callable[[], Scene]]
+"""Configuration and samples of a throw, what each sensor saw, and a function that makes its scene once."""
 
 
 @dataclass(frozen=True)
@@ -59,33 +61,29 @@ def make_sensor_routes(instances: Instances) -> APIRouter:
 
     # Clients ask for one frame of a throw after the other.
     @lru_cache(maxsize=1)
-    def open_throw(instance: str, trial: int, _changed_ns: int) -> tuple[Config, Samples, dict[str, SensorFrames]]:
+    def read_throw(instance: str, trial: int, _changed_ns: int) -> _OpenThrow:
         plan, episode = find_throw(instances, instance, trial)
         config = plan.config_of(plan.trial(trial))
         recorded = episode.header, episode.samples(robot_of(config).joints)
         frames = {name: SensorFrames(name, config, *recorded, episode.sensors) for name in config.sensors}
-        return config, recorded[1], frames
+        return config, recorded[1], frames, cache(lambda: Scene.of(config))
 
-    @lru_cache(maxsize=1)
-    def make_scene(instance: str, trial: int, changed_ns: int) -> Scene:
-        return Scene.of(open_throw(instance, trial, changed_ns)[0])
-
-    def find_change(instance: str) -> int:
-        """Find when the dataset was begun [ns]: it may be another one than before with the same id."""
-        return (find_plan(instances, instance)[0] / PLAN).stat().st_mtime_ns
+    def open_throw(instance: str, trial: int) -> _OpenThrow:
+        # The dataset may be another one than before with the same id, which was begun at another time.
+        return read_throw(instance, trial, (find_plan(instances, instance)[0] / PLAN).stat().st_mtime_ns)
 
     @router.get("/sensors")
     def sensors(instance: str, trial: int) -> list[SensorSummary]:
         """The sensors of a throw, in the order of the configuration; none if it has none."""
         with lock:
-            config, _, frames = open_throw(instance, trial, find_change(instance))
+            config, _, frames, _ = open_throw(instance, trial)
             return [_describe(name, config, each.time_s.tolist()) for name, each in frames.items()]
 
     @router.get("/sensors/{name}/{stream}/{frame}", response_class=Response)
     def frame(instance: str, trial: int, name: str, stream: str, frame: int) -> Response:
         """A frame by rows: colors uint8, labels uint16, depths and ranges float32, points 4 float32 (label last)."""
         with lock:
-            config, _, frames = open_throw(instance, trial, find_change(instance))
+            config, _, frames, _ = open_throw(instance, trial)
             streams = _describe(name, config, []).streams if name in frames else []
             if stream not in streams or frame not in range(len(frames[name])):
                 raise NotFoundError(f"trial {trial} of run {instance} has no frame {frame} of {name}/{stream}")
@@ -100,8 +98,8 @@ def make_sensor_routes(instances: Instances) -> APIRouter:
         with pace:
             time.sleep(_STEP_S)
         with lock:
-            config, samples, _ = open_throw(instance, trial, find_change(instance))
-            scene = make_scene(instance, trial, find_change(instance))
+            config, samples, _, make_scene = open_throw(instance, trial)
+            scene = make_scene()
             config = with_sensors(config, {"camera": {**camera, "kind": "camera", "streams": ["color"]}})
             number = min(round(time_s * config.record.rate_hz), len(samples) - 1)
             seen = make_sensor("camera", config, scene, trial).look(scene.place_sample(samples, number), number)

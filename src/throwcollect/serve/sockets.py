@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
 from contextlib import suppress
 from typing import Any
 
@@ -41,6 +41,12 @@ async def close(socket: WebSocket, error: ThrowcollectError) -> None:
             # A page learns nothing about a socket that was not accepted.
             await socket.accept()
         await socket.close(code, reason)
+
+
+async def send_all(socket: WebSocket, frames: AsyncIterator[str | bytes]) -> None:
+    """Send frames as they come: text in text frames, bytes in binary ones."""
+    async for frame in frames:
+        await (socket.send_text(frame) if isinstance(frame, str) else socket.send_bytes(frame))
 
 
 async def keep_sending(

@@ -180,10 +180,6 @@ class States:
         self._read_at = -math.inf
         self._one_look = asyncio.Lock()
 
-    def list_instances(self) -> list[InstanceState]:
-        """All runs that this machine remembers, the latest first."""
-        return _describe_all(self._read_runs())
-
     async def read(self, oldest_s: float = 0.0) -> WholeState:
         """Read the state, or return the last one if it is not older than this [s]."""
         # Only one reads at a time, so that an older state never gets a higher revision than a newer one.
@@ -211,7 +207,10 @@ class States:
         """All runs that live, and the latest of those that are over."""
         runs = self._read_runs()
         over = [run for run in runs if run.status != "running"]
-        instances = _describe_all([run for run in runs if run.status == "running"] + over[:_MOST_OVER])
+        alive = [run for run in runs if run.status == "running"]
+        # A dataset that another run continues right now cannot be resumed.
+        growing = {run.record.directory for run in alive}
+        instances = [describe(run, is_growing=run.record.directory in growing) for run in (*alive, *over[:_MOST_OVER])]
         living = [each for each in instances if each.status not in ("ended", "died")]
         components = [
             ComponentState(
@@ -238,9 +237,3 @@ class States:
                     ended[written] = run
         self._ended = ended
         return sorted(runs, key=lambda run: run.record.started, reverse=True)
-
-
-def _describe_all(runs: list[Run]) -> list[InstanceState]:
-    # A dataset that another run continues right now cannot be resumed.
-    growing = {run.record.directory for run in runs if run.status == "running"}
-    return [describe(run, is_growing=run.record.directory in growing) for run in runs]

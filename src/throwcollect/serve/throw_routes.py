@@ -88,9 +88,8 @@ def make_throw_routes(instances: Instances) -> APIRouter:
     @router.get("/{trial}", response_class=Response)
     def throw(instance: str, trial: int) -> Response:
         """A throw as the page replays it: as a message of the socket `shown`, without the name of a simulation."""
-        _, found = find_throw(instances, instance, trial)
-        directory = get_collection(instances, instance).record.directory
-        message = encode_throw(found, "", *describe_trial(directory, trial))
+        plan, found = find_throw(instances, instance, trial)
+        message = encode_throw(found, "", *describe_trial(plan, trial))
         return Response(message, media_type="application/octet-stream")
 
     return router

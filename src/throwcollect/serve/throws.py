@@ -34,12 +34,8 @@ _ENDS = ("landing", "rest")
 """Instants at whose place the object ended; the first one that a result has counts."""
 
 
-def encode_throw(
-    episode: Episode, simulation: str, values: Mapping[str, float], bodies: tuple[BodyLook, ...] | None
-) -> bytes:
-    """Encode an episode for the page, with the name of its simulation and the swept values by their dotted keys.
-
-    The bodies are those of this trial, or None if they are not known.
+def encode_throw(episode: Episode, simulation: str, values: Mapping[str, float], bodies: tuple[BodyLook, ...]) -> bytes:
+    """Encode an episode for the page, with its simulation, its swept values by their dotted keys, and its bodies.
 
     Returns:
         Length of a JSON header as uint32, the header, zero bytes up to a multiple of four, then float32: angles of the
@@ -61,7 +57,7 @@ def encode_throw(
         "rate_hz": NS_PER_S / spacing_ns,
         "landing": next((place for place in places if None not in place), None),
         "values": dict(values),
-        "bodies": None if bodies is None else [asdict(body) for body in bodies],
+        "bodies": [asdict(body) for body in bodies],
     }
     text = json.dumps(header).encode()
     # In JavaScript, a typed array has to begin at a multiple of the size of its numbers.
@@ -82,13 +78,10 @@ def _read_plan(directory: Path, _changed_ns: int) -> Plan:
     return Plan.read(directory / PLAN, load(config_path(directory)))
 
 
-def describe_trial(directory: Path, trial: int) -> tuple[Mapping[str, float], tuple[BodyLook, ...] | None]:
-    """Swept values of a trial, by dotted key, and its bodies; none if the plan cannot be read on this machine."""
-    try:
-        planned = (plan := read_plan(directory)).trial(trial)
-        return planned.values, looks_of(plan.config_of(planned))
-    except (ThrowcollectError, OSError, IndexError):
-        return {}, None
+def describe_trial(plan: Plan, trial: int) -> tuple[Mapping[str, float], tuple[BodyLook, ...]]:
+    """Read the swept values of a trial, by dotted key, and its bodies."""
+    planned = plan.trial(trial)
+    return planned.values, looks_of(plan.config_of(planned))
 
 
 async def hear_throws(run: Run, bridge: Bridge) -> AsyncGenerator[bytes]:
@@ -135,8 +128,8 @@ def _encode(run: Run, simulation: str, message: bytes) -> bytes | None:
         episode = unpack(message, Signer.of_key(run.key))
         if not isinstance(episode, Episode) or not episode.result:
             return None
-        planned = describe_trial(run.record.directory, episode.header.trial)
+        planned = describe_trial(read_plan(run.record.directory), episode.header.trial)
         return encode_throw(episode, simulation, *planned)
-    except ThrowcollectError:
-        # Another node has published something else on this topic.
+    except (ThrowcollectError, OSError):
+        # Another node has published something else on this topic, or the dataset was removed.
         return None

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
 from contextlib import aclosing
 
 from fastapi import APIRouter, Request, Response, WebSocket
 from fastapi.responses import FileResponse
 
+from throwcollect.collect.runs.run import Run
 from throwcollect.serve.access import MAY_ONLY_LOOK
 from throwcollect.serve.instances import Instances
 from throwcollect.serve.live import restore_speed, slow_down
@@ -22,7 +22,7 @@ from throwcollect.serve.robot_files import (
     scene_of,
 )
 from throwcollect.serve.rosbridge_routes import Bridges, wait_for_end
-from throwcollect.serve.sockets import MAY_NOT, keep_sending
+from throwcollect.serve.sockets import MAY_NOT, keep_sending, send_all
 from throwcollect.serve.throws import hear_throws
 
 _XML = {"requestBody": {"required": True, "content": {"application/xml": {"schema": {"type": "string"}}}}}
@@ -80,30 +80,24 @@ def make_view_routes(instances: Instances, bridges: Bridges) -> APIRouter:
         run = await asyncio.to_thread(instances.get, instance)
         async with bridges.share(run) as bridge, aclosing(hear_throws(run, bridge)) as throws:
             await socket.accept()
-            await keep_sending(socket, _send_throws(socket, throws), wait_for_end(run, bridge))
+            await keep_sending(socket, send_all(socket, throws), wait_for_end(run, bridge))
 
     @router.websocket("/instances/{instance}/live/{simulation}")
     async def live(socket: WebSocket, instance: str, simulation: str) -> None:
-        await _keep_slow(socket, instances, instance, simulation)
+        if not socket.state.may_change:
+            await socket.accept()
+            await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
+        else:
+            await _keep_slow(socket, await asyncio.to_thread(instances.get, instance), simulation)
 
     return router
 
 
-async def _keep_slow(socket: WebSocket, instances: Instances, instance: str, simulation: str) -> None:
+async def _keep_slow(socket: WebSocket, run: Run, simulation: str) -> None:
     """Keep a simulation slow as long as a client is connected; nothing is ever sent to it."""
-    if not socket.state.may_change:
-        await socket.accept()
-        await socket.close(MAY_NOT, MAY_ONLY_LOOK[1])
-        return
-    run = await asyncio.to_thread(instances.get, instance)
     lock = await asyncio.to_thread(slow_down, run, simulation)
     try:
         await socket.accept()
         await keep_sending(socket, wait_for_end(run))
     finally:
         await asyncio.to_thread(restore_speed, run, simulation, lock)
-
-
-async def _send_throws(socket: WebSocket, throws: AsyncIterator[bytes]) -> None:
-    async for throw in throws:
-        await socket.send_bytes(throw)

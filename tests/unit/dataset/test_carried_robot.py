@@ -74,9 +74,8 @@ def test_it_is_verified_and_replayed_and_names_no_path(carrying: Path, place: Pa
 
 def test_it_is_drawn(carrying: Path, place: Path, tmp_path: Path) -> None:
     assert render(carrying, tmp_path / "throw.png", size=(96, 72)).pictures == 1
-    seen = view(carrying, tmp_path / "view", [0])
-    meshes = list((tmp_path / "view" / "panda_description").glob("*.dae"))
-    assert seen.mesh_bytes == sum(path.stat().st_size for path in meshes) > 0
+    view(carrying, tmp_path / "view", [0])
+    assert list((tmp_path / "view" / "panda_description").glob("*.dae"))
     assert list_places(tmp_path / "view", of=place) == []
 
 

@@ -49,7 +49,7 @@ def test_a_container_component_is_read_with_all_its_keys(directory: Path) -> Non
 
 
 def test_a_configuration_alone_gives_a_catalogue_of_one_component(directory: Path) -> None:
-    catalogue = Catalogue.find(directory / "small.yaml")
+    catalogue = Catalogue.read(directory / "small.yaml")
     assert [(each.name, each.kind, each.max_instances) for each in catalogue.components.values()] == [
         ("small", "collection", 1)
     ]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +67,19 @@ def test_a_component_never_has_more_than_max_instances(client: TestClient, remem
     assert client.put(f"{URL}/e", json={"component": "talos"}).json()["hint"] == "stop one of d"
 
 
+def test_concurrent_clients_get_at_most_max_instances(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = instances_module.begin_run
+
+    def begin_slowly(*arguments: Any, **options: Any) -> Run:
+        time.sleep(0.1)
+        return begin(*arguments, **options)
+
+    monkeypatch.setattr(instances_module, "begin_run", begin_slowly)
+    with ThreadPoolExecutor(4) as pool:
+        statuses = pool.map(lambda name: put(client, name).status_code, "abcd")
+    assert sorted(statuses) == [202, 202, 409, 409]
+
+
 def test_a_resumed_collection_counts_as_an_instance(client: TestClient, remember: Remember, tmp_path: Path) -> None:
     directory = tmp_path / "datasets" / "old"
     directory.mkdir(parents=True)
@@ -93,7 +108,7 @@ def test_a_dataset_that_another_run_goes_on_with_is_not_resumed(
     remember("again", directory=str(directory))
     assert not list_resumable()
     said = client.post("/api/v1/collections/old/resume")
-    assert (said.status_code, said.json()["title"]) == (409, "run again collects into the dataset of run old")
+    assert (said.status_code, said.json()["title"]) == (409, f"{directory}: run again collects into it")
 
 
 def test_the_state_says_which_collections_can_be_resumed(
@@ -221,9 +236,9 @@ def test_the_state_lists_living_instances_and_the_latest_ended_ones(client: Test
     assert found["components"][0]["instances"] == ["living"]
     assert found["instances"][0]["robots"] == ["sim_0"]
     # Processes have ended with the launcher; containers outlive it.
-    died = {each["id"]: each for each in client.get(URL).json() if each["status"] == "died"}
+    died = {each["id"]: each for each in found["instances"] if each["status"] == "died"}
     assert (died["lost"]["nodes"], died["lost"]["robots"]) == ([], [])
     assert died["left"]["robots"] == ["sim_0"]
     assert found["instances"][1]["message"] == "no plan\n  try: mend it"
-    assert len(client.get(URL).json()) == 107
+    assert client.get(URL).json() == found["instances"]
     assert client.get("/api/v1/state").json() == found

@@ -28,4 +28,4 @@ def test_the_rests_of_pucks_are_on_the_map(client: TestClient, tmp_path: Path, r
     simulator = Simulator(dataset.config)
     episode = simulator.run(Trial(0, dataset[0].parameters, 0, ""))
     simulator.close()
-    assert f'"landing": [{rests[0][0]}, {rests[0][1]}'.encode() in encode_throw(episode, "sim", {}, None)
+    assert f'"landing": [{rests[0][0]}, {rests[0][1]}'.encode() in encode_throw(episode, "sim", {}, ())

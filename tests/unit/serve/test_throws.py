@@ -91,9 +91,9 @@ def test_an_encoded_throw_holds_its_result_values_and_samples(collected: Path) -
     assert np.allclose(path.reshape(-1, 3), samples.object_position)
     assert np.allclose(poses.reshape(-1, 7)[:, 3:], samples.object_orientation_xyzw)
     fell = json.dumps({**result, "landing_z_m": None})
-    told = encode_throw(Episode(episode.header, episode.chunk, result=fell), "sim_0", {}, None)
+    told = encode_throw(Episode(episode.header, episode.chunk, result=fell), "sim_0", {}, ())
     header = json.loads(told[4 : 4 + int.from_bytes(told[:4], "little")])
-    assert (header["landing"], header["bodies"]) == (None, None)
+    assert (header["landing"], header["bodies"]) == (None, [])
 
 
 def test_an_encoded_throw_holds_the_poses_of_bodies_that_move(collected: Path) -> None:
@@ -112,23 +112,13 @@ def test_an_encoded_throw_holds_the_poses_of_bodies_that_move(collected: Path) -
     np.testing.assert_allclose(poses[:, 7:10], episode.samples().object_position, rtol=1e-6)
 
 
-def test_planned_values_come_from_the_plan(collected: Path, tmp_path: Path) -> None:
-    for trial in Dataset.open(collected).plan.trials:
-        assert describe_trial(collected, trial.number) == (
-            trial.values,
-            looks_of(Dataset.open(collected).plan.config_of(trial)),
-        )
-    assert set(describe_trial(collected, 0)[0]) == {"task.end.arm_right_4_joint", "task.duration_s", "ball.mass_kg"}
-    assert describe_trial(collected, 99) == ({}, None)
-    assert describe_trial(tmp_path, 0) == ({}, None)
-
-
-def test_a_throw_has_the_bodies_of_its_own_trial(tmp_path: Path) -> None:
+def test_a_throw_has_the_values_and_the_bodies_of_its_own_trial(tmp_path: Path) -> None:
     swept = {"task.bin.x_m": {"values": [1.0, 2.0]}}
     settings = {"trials": None, "task": {"name": "throw_into"}, "sweep": {"sampler": "grid", "parameters": swept}}
     directory = Collection(settings).collect(tmp_path / "a")
-    found = [describe_trial(directory, number)[1] for number in (0, 1)]
-    assert [bodies[0].position_m[0] for bodies in found if bodies] == [1.0, 2.0]
+    found = [describe_trial(Dataset.open(directory).plan, number) for number in (0, 1)]
+    assert [values for values, _ in found] == [{"task.bin.x_m": 1.0}, {"task.bin.x_m": 2.0}]
+    assert [bodies[0].position_m[0] for _, bodies in found] == [1.0, 2.0]
 
 
 def make_nodes(*names: str) -> tuple[NodeState, ...]:

@@ -44,13 +44,7 @@ def test_the_scene_has_its_heights_and_the_range_of_targets(
     aimed = {"base_height_m": 1.1, "landing_height_m": None, "target_distance_m": [0.5, 2.5], **plain}
     assert read_scene(client) == aimed
     (directory / "config.yaml").write_text((CONFIGS / "panda.yaml").read_text())
-    arm = {
-        "base_height_m": 0.8,
-        "mount_height_m": 0.8,
-        "landing_height_m": 0.0,
-        "target_distance_m": None,
-        "bodies": ["ball"],
-    }
+    arm = {**known, "base_height_m": 0.8, "mount_height_m": 0.8, "landing_height_m": 0.0}
     assert read_scene(client) == arm
 
 

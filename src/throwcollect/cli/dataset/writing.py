@@ -69,8 +69,8 @@ def view(
 
     written = write_view(directory, output, None if trials is None else read_trials(trials))
     text = (
-        f"{written.recording}: {format_count(written.throws, 'throw')}, {written.duration_s:.0f} s, "
-        f"{written.recording_bytes / 1e6:.1f} MB; meshes next to it: {written.mesh_bytes / 1e6:.1f} MB\n"
+        f"{written.recording}: {format_count(written.throws, 'throw')}, {written.duration_s:.0f} s; "
+        f"with meshes {written.size_bytes / 1e6:.1f} MB\n"
         f"Foxglove  open {written.recording.name}, then import the layout {written.layout}\n"
         f"Rerun     ROS_PACKAGE_PATH={shlex.quote(str(output.absolute()))} "
         f"rerun {shlex.quote(str(written.recording))}"

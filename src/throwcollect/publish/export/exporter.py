@@ -112,11 +112,11 @@ def _explain_samples(source: ExportSource, layout: Layout) -> Iterator[str]:
 def tabulate_signals(source: ExportSource, *, columns: bool = False) -> list[str]:
     """List the signals of a source in a Markdown table, by the names of their arrays or of their columns."""
     return [
-        f"| {'columns' if columns else 'array'} | unit | of | |",
+        f"| {'columns' if columns else 'array'} | unit | size | |",
         "|---|---|---|---|",
         *(
-            f"| {_quote(signal.pattern.split(', ') if columns else [signal.name])} | {signal.unit} | {signal.each} "
-            f"| {signal.description} |"
+            f"| {_quote(signal.pattern.split(', ') if columns else [signal.name])} | {signal.unit} "
+            f"| {len(signal.columns)} | {signal.description} |"
             for signal in source.signals
         ),
         "",

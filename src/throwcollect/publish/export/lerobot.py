@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from itertools import islice
@@ -28,6 +28,7 @@ from throwcollect.publish.export.images import (
     VIDEOS,
     ImageSeries,
     encode_pictures,
+    summarise_pictures,
 )
 from throwcollect.publish.export.parquet import FILES_PER_CHUNK, MEGABYTES_PER_FILE, PATH, ParquetSeries
 from throwcollect.publish.export.throw_source import NO_IMAGES, ExportSource, ThrowSeries, unit_of
@@ -38,9 +39,7 @@ _EPISODES_PER_GROUP = 100
 _FARTHEST_M = 65.535
 """No depth beyond has a number of millimetres."""
 
-Frames = NDArray[np.float64]
-"""Values of one feature, shape ``(n_frames, n_components)``."""
-Statistics = dict[str, list[Any]]
+Statistics = dict[str, NDArray[Any]]
 """``min``, ``max``, ``mean``, ``std`` and quantiles of each component; ``count``, the number of frames."""
 
 
@@ -49,25 +48,23 @@ class Feature:
     """One feature of the frames of an episode.
 
     Attributes:
-        dtype: Type of its numbers, as both NumPy and Arrow call it.
-        values: Its values, rounded to this type, as statistics are those of the stored numbers.
+        values: Its values as they are stored, shape ``(n_frames, n_components)``.
         names: Names of its components; None for a scalar.
     """
 
-    dtype: str
-    values: Frames
+    values: NDArray[Any]
     names: tuple[str, ...] | None = None
 
     def as_column(self) -> pa.Array:
         """Make its column in the table of frames."""
-        flat = pa.array(self.values.astype(self.dtype).ravel())
+        flat = pa.array(self.values.ravel())
         return flat if self.names is None else pa.FixedSizeListArray.from_arrays(flat, len(self.names))
 
     def as_dict(self) -> dict[str, object]:
         """Make its entry in ``meta/info.json``."""
         names = None if self.names is None else list(self.names)
         # In LeRobot, a scalar has the shape (1,), although its column in the file is no list.
-        return {"dtype": self.dtype, "shape": [len(self.names or ("",))], "names": names}
+        return {"dtype": self.values.dtype.name, "shape": [len(self.names or ("",))], "names": names}
 
 
 def describe(source: ExportSource) -> Layout:
@@ -112,6 +109,7 @@ dataset = LeRobotDataset("me/throws", root=".")
 def write(source: ExportSource, directory: Path) -> None:
     """Write a dataset in LeRobot's format; see `Exporter.write`."""
     features: dict[str, Feature] = {}
+    totals: dict[str, Statistics] = {}
     tasks: dict[str, int] = {}
     table = _number_episodes(source)
     (directory / THROWS).write_bytes(encode_table(table))
@@ -140,24 +138,28 @@ def write(source: ExportSource, directory: Path) -> None:
                 chunk, file = data.place()
                 columns = {name: feature.as_column() for name, feature in features.items()}
                 table_of_frames = pa.table(columns, metadata={"throwcollect.digest": source.dataset.digest})
-                rows.append(_describe_episode(features, task, number=number, first=first, chunk=chunk, file=file))
+                own = {name: _summarise(feature.values.astype(np.float64)) for name, feature in features.items()}
+                videos: dict[str, Any] = {}
                 seen = {name: source.look(throw.throw, name) for name in source.streams}
                 for (name, stream), series in images.items():
                     pictures = seen[name][FRAMES[stream]]
                     if stream == "depth":
                         depth_mm = np.rint(np.where(pictures < _FARTHEST_M, pictures, 0) * 1000)
                         pictures = depth_mm.astype(np.uint16)[..., np.newaxis]
-                    rows[-1] |= series.append(pictures)
+                    own[series.key] = summarise_pictures(pictures)
+                    videos |= series.append(pictures)
                     if series.in_table:
                         table_of_frames = table_of_frames.append_column(series.key, encode_pictures(pictures))
                 data.append(table_of_frames)
+                totals = {name: _combine(totals[name], each) if totals else each for name, each in own.items()}
+                row = _describe_episode(own, task, number=number, first=first, chunk=chunk, file=file)
+                rows.append(row | videos)
                 first += len(throw)
             _append_episodes(meta, rows, episodes.slice(start, len(rows)))
     entries = {name: feature.as_dict() for name, feature in features.items()}
     entries |= {series.key: series.as_feature() for series in images.values()}
     _write_json(directory / "meta" / "info.json", _describe_dataset(source, entries, frames=first, tasks=len(tasks)))
-    statistics: dict[str, Mapping[str, Any]] = {name: _summarise_all(data.paths, name) for name in features}
-    statistics |= {series.key: series.summarise() for series in images.values()}
+    statistics = {name: {key: values.tolist() for key, values in each.items()} for name, each in totals.items()}
     _write_json(directory / "meta" / "stats.json", statistics)
     pq.write_table(_tabulate_tasks(tasks), directory / "meta" / "tasks.parquet")
 
@@ -189,8 +191,7 @@ def _compute_features(
     goal = (f"target.{each.word.replace(' ', '_')}" for each in source.targets)
 
     def make(dtype: str, values: NDArray[Any], names: Iterable[str] | None = None) -> Feature:
-        rounded = values.astype(dtype).astype(np.float64).reshape(count, -1)
-        return Feature(dtype, rounded, None if names is None else tuple(names))
+        return Feature(values.astype(dtype).reshape(count, -1), None if names is None else tuple(names))
 
     return {
         "observation.state": make("float32", state, (*positions, *(f"{joint}.vel" for joint in joints))),
@@ -211,9 +212,9 @@ def _compute_features(
 
 
 def _describe_episode(
-    features: dict[str, Feature], task: str, *, number: int, first: int, chunk: int, file: int
+    statistics: Mapping[str, Statistics], task: str, *, number: int, first: int, chunk: int, file: int
 ) -> dict[str, Any]:
-    length = len(features["index"].values)
+    length = int(statistics["index"]["count"][0])
     row = {
         "episode_index": number,
         "tasks": [task],
@@ -223,8 +224,8 @@ def _describe_episode(
         "dataset_from_index": first,
         "dataset_to_index": first + length,
     }
-    for name, feature in features.items():
-        row |= {f"stats/{name}/{key}": values for key, values in _summarise(feature.values).items()}
+    for name, each in statistics.items():
+        row |= {f"stats/{name}/{key}": values.tolist() for key, values in each.items()}
     return row
 
 
@@ -284,26 +285,32 @@ def _tabulate_tasks(tasks: Mapping[str, int]) -> pa.Table:
     )
 
 
-def _summarise(frames: Frames) -> Statistics:
-    """Compute the statistics of frames, by the names that LeRobot gives them."""
+def _summarise(frames: NDArray[np.float64]) -> Statistics:
+    """Compute the statistics of the values of a feature, by the names that LeRobot gives them."""
     quantiles = np.quantile(frames, list(QUANTILES.values()), axis=0)
     return {
-        "min": frames.min(axis=0).tolist(),
-        "max": frames.max(axis=0).tolist(),
-        "mean": frames.mean(axis=0).tolist(),
-        "std": frames.std(axis=0).tolist(),
-        "count": [len(frames)],
-        **dict(zip(QUANTILES, quantiles.tolist(), strict=True)),
+        "min": frames.min(axis=0),
+        "max": frames.max(axis=0),
+        "mean": frames.mean(axis=0),
+        "std": frames.std(axis=0),
+        "count": np.array([len(frames)]),
+        **dict(zip(QUANTILES, quantiles, strict=True)),
     }
 
 
-def _summarise_all(paths: Sequence[Path], name: str) -> Statistics:
-    """Compute the statistics of a feature of all frames, component by component, as they may be many."""
-    column = pq.read_table([*paths], columns=[name])[name].combine_chunks()
-    values = (column.flatten() if pa.types.is_fixed_size_list(column.type) else column).to_numpy(zero_copy_only=False)
-    components = values.reshape(len(column), -1).T
-    each = [_summarise(np.array(component, np.float64)[:, np.newaxis]) for component in components]
-    return {key: [number for part in each for number in part[key]] for key in each[0]} | {"count": [len(column)]}
+def _combine(before: Statistics, after: Statistics) -> Statistics:
+    """Combine the statistics of two sets of frames, as LeRobot does: quantiles become weighted means of quantiles."""
+    count = before["count"] + after["count"]
+    share = after["count"] / count
+    apart = after["mean"] - before["mean"]
+    variance = (1 - share) * before["std"] ** 2 + share * after["std"] ** 2 + share * (1 - share) * apart**2
+    return {
+        **{key: values + share * (after[key] - values) for key, values in before.items()},
+        "min": np.minimum(before["min"], after["min"]),
+        "max": np.maximum(before["max"], after["max"]),
+        "std": np.sqrt(variance),
+        "count": count,
+    }
 
 
 def _write_json(path: Path, value: object) -> None:

@@ -29,8 +29,6 @@ scipy_io = lazily("scipy.io")
 
 BASIS_FUNCTIONS = 25
 """Number of basis functions of each joint in a fitted DMP."""
-_LONGEST_NAME = 63
-"""Most characters of the name of a field in MATLAB."""
 
 
 def describe(source: ExportSource) -> Layout:
@@ -87,12 +85,6 @@ def write(source: ExportSource, directory: Path) -> None:
             f"mat has the structure of a throwing database, and the task {task.name} throws no ball",
             expected="another format",
         )
-    if long := [name for name in source.table.column_names if len(name) > _LONGEST_NAME]:
-        raise refuse_argument(
-            "to",
-            f"mat has no room for the name of the column {long[0]}",
-            expected=f"at most {_LONGEST_NAME} characters, or another format",
-        )
     # An array of objects, as strings are, becomes a cell array; one of strings would become a matrix of characters.
     columns = {name: to_array(source.table[name])[:, np.newaxis] for name in source.table.column_names}
     units = {field.name: read_metadata(field).get("unit", "") for field in source.table.schema}
@@ -106,9 +98,9 @@ def write(source: ExportSource, directory: Path) -> None:
 def _save(path: Path, variables: Mapping[str, Any]) -> None:
     try:
         scipy_io.savemat(path, variables, do_compression=True, long_field_names=True)
-    except scipy_io.matlab.MatWriteError as error:
-        hint = "export at a lower rate, or another format"
-        raise DatasetError(f"{path.name}: {error}", expected="less than 4 GiB a variable", hint=hint) from error
+    except (scipy_io.matlab.MatWriteError, ValueError) as error:
+        # A variable has at most 4 GiB, and the name of a column at most 63 characters.
+        raise DatasetError(f"{path.name}: {error}", hint="export at a lower rate, or another format") from error
 
 
 def _make_cell(values: Sequence[Any]) -> NDArray[np.object_]:

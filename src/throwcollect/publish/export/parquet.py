@@ -105,11 +105,9 @@ def write(source: ExportSource, directory: Path) -> None:
             for throw in source.read(throws):
                 sent[str(throw.throw.trial)] = throw.trajectory
                 group.append(_make_batch(throw, source, schema))
-                if sum(map(len, group)) >= _ROWS_PER_GROUP:
+                if sum(map(len, group)) >= _ROWS_PER_GROUP or len(sent) == len(throws):
                     writer.write_table(pa.Table.from_batches(group))
                     group = []
-            if group:
-                writer.write_table(pa.Table.from_batches(group))
         motions = Motions.of(sent, robot_of(source.dataset.config))
         (directory / _MOTIONS / f"{shard}.parquet").write_bytes(encode_table(motions.table()))
 

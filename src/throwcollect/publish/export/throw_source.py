@@ -47,14 +47,12 @@ class Signal:
         name: Name of the array ``(n_samples, n_components)``, or ``(n_samples,)`` without components.
         description: One sentence.
         components: Name of each component as a column of its own; empty for a scalar.
-        each: Its components in words.
         pattern: Names of their columns in short.
     """
 
     name: str
     description: str
     components: tuple[str, ...] = ()
-    each: str = ""
     pattern: str = ""
 
     @property
@@ -78,10 +76,10 @@ _JOINT_SIGNALS = {
 }
 """Of all joints what is measured, of those that move what is commanded."""
 _BODY_SIGNALS = {
-    "position_m": ("Centre of the {} in world.", "position", "xyz"),
-    "orientation_xyzw": ("Unit quaternion, {} to world.", "orientation_xyzw", "xyzw"),
-    "velocity_mps": ("Velocity of the {} in world.", "velocity", "xyz"),
-    "angular_velocity_radps": ("Angular velocity of the {} in world.", "angular_velocity", "xyz"),
+    "position_m": ("Centre of the {} in world.", "position"),
+    "orientation_xyzw": ("Unit quaternion, {} to world.", "orientation_xyzw"),
+    "velocity_mps": ("Velocity of the {} in world.", "velocity"),
+    "angular_velocity_radps": ("Angular velocity of the {} in world.", "angular_velocity"),
 }
 
 
@@ -97,14 +95,12 @@ def list_signals(config: Config, targets: Sequence[TargetColumn]) -> Iterator[Si
         joints = robot.joints if measured else config.moving_joints
         names = {joint: f"{joint}_{ending}" for joint in joints}
         components = tuple(name_sliding(own) if joint in robot.sliding else own for joint, own in names.items())
-        each = f"{len(joints)} joints" if measured else "moving joints"
-        yield Signal(name, description, components, each, f"<joint>_{ending}")
+        yield Signal(name, description, components, f"<joint>_{ending}")
     for body in moving_bodies_of(config):
-        for ending, (description, quantity, axes) in _BODY_SIGNALS.items():
+        for ending, (description, quantity) in _BODY_SIGNALS.items():
             components = tuple(f"{body}_{component}" for component in BODY_COMPONENTS[quantity])
-            pattern = ", ".join(components)
-            yield Signal(f"{body}_{ending}", description.format(body), components, ", ".join(axes), pattern)
-    yield from (Signal(each.name, each.description, (each.name,), "target", each.name) for each in targets)
+            yield Signal(f"{body}_{ending}", description.format(body), components, ", ".join(components))
+    yield from (Signal(each.name, each.description, (each.name,), each.name) for each in targets)
 
 
 Signals = Mapping[str, NDArray[np.float64]]

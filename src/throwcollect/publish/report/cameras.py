@@ -45,7 +45,7 @@ def show_cameras(dataset: Dataset) -> Iterator[ReportSection]:
     if blocks and throws:
         noun = dataset.config.task.noun
         text = f"A few {noun}s, one in each row, with the time since its start."
-        yield ReportSection("cameras", "Cameras", "What the cameras see", text, tuple(blocks))
+        yield ReportSection("cameras", "What the cameras see", text, tuple(blocks))
 
 
 def _show_frames(frames: SensorFrames, shades: bool) -> Iterator[str]:

@@ -61,15 +61,13 @@ class ReportSection:
     """A part of the page.
 
     Attributes:
-        key: Its name in links.
-        short: Its name in the table of contents.
+        key: Its name in links and, with a capital letter, in the table of contents.
         title: Its subject, as text.
         text: Its summary, as text; `markupsafe.Markup` for HTML.
         blocks: Below one another; a string is a paragraph.
     """
 
     key: str
-    short: str
     title: str
     text: str
     blocks: tuple[Row | Table | Listing | str, ...] = ()

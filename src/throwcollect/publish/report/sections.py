@@ -165,7 +165,7 @@ def _report_task(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
 def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> ReportSection:
     title, trials = "How the parameter space is covered", len(outcomes.codes)
     if not parameters:
-        return ReportSection("parameters", "Parameters", title, "Nothing was swept.")
+        return ReportSection("parameters", title, "Nothing was swept.")
     shown = parameters[: figures.MOST_KEYS]
     notes = []
     if len(shown) < len(parameters):
@@ -183,7 +183,7 @@ def _show_parameters(parameters: tuple[SweptKey, ...], outcomes: Outcomes) -> Re
         number_columns=(1, 2),
     )
     text = f"{len(parameters)} key{'s' if len(parameters) > 1 else ''} varied from trial to trial."
-    return ReportSection("parameters", "Parameters", title, text, (*([(panel,)] if len(shown) > 1 else []), table))
+    return ReportSection("parameters", title, text, (*([(panel,)] if len(shown) > 1 else []), table))
 
 
 def _show_outcomes(
@@ -205,7 +205,7 @@ def _show_outcomes(
                 for number, each in enumerate(parameters)
             )
         )
-    return ReportSection("outcomes", "Outcomes", title, text, tuple(blocks))
+    return ReportSection("outcomes", title, text, tuple(blocks))
 
 
 def _show_limits(peaks: dict[str, dict[str, NDArray[np.float64]]], noun: str) -> ReportSection:
@@ -221,7 +221,7 @@ def _show_limits(peaks: dict[str, dict[str, NDArray[np.float64]]], noun: str) ->
         if joints
     )
     if not panels:
-        return ReportSection("limits", "Limits", title, f"No {noun} was measured.")
+        return ReportSection("limits", title, f"No {noun} was measured.")
     reached = (
         f"{sum(int((each >= 1).sum()) for each in joints.values()):,} of {kind}" for kind, joints in peaks.items()
     )
@@ -229,7 +229,7 @@ def _show_limits(peaks: dict[str, dict[str, NDArray[np.float64]]], noun: str) ->
         f"Of each {noun}, the joint that came closest; 1 is at the limit. Boxes span the quartiles, whiskers all "
         f"{noun}s. {noun.capitalize()}s that reached a limit: {', '.join(reached)}."
     )
-    return ReportSection("limits", "Limits", title, text, (panels,))
+    return ReportSection("limits", title, text, (panels,))
 
 
 def _show_throughput(times: dict[str, list[float]], total_s: float, info: Info) -> ReportSection:
@@ -238,7 +238,7 @@ def _show_throughput(times: dict[str, list[float]], total_s: float, info: Info) 
         no_journal = Markup(
             "This dataset has no journal of its collection (<code>logs/journal.jsonl</code>) with {}s in it."
         ).format(info.noun)
-        return ReportSection("throughput", "Throughput", title, no_journal)
+        return ReportSection("throughput", title, no_journal)
     wall_s = info.wall_s or total_s
     text = (
         f"{commits:,} {info.noun}s in {wall_s:,.1f} s, start of the nodes included; "
@@ -247,13 +247,13 @@ def _show_throughput(times: dict[str, list[float]], total_s: float, info: Info) 
     if (resumed := len(times["opened"]) - 1) > 0:
         text += f" It was resumed {f'{resumed} times' if resumed > 1 else 'once'} (dotted); the pauses are left out."
     panel = Panel("rate", f"{info.noun.capitalize()}s a second", figures.draw_throughput(times, total_s, info.noun))
-    return ReportSection("throughput", "Throughput", title, text, ((panel,),))
+    return ReportSection("throughput", title, text, ((panel,),))
 
 
 def _show_provenance(facts: dict[str, str], config: str) -> ReportSection:
     text = Markup("<code>throwcollect dataset verify</code> checks the recordings against the digest of the dataset.")
     table = Table(tuple((name, _CODE.format(value)) for name, value in facts.items()))
-    return ReportSection("provenance", "Provenance", "Where it comes from", text, (table, Listing(CONFIG, config)))
+    return ReportSection("provenance", "Where it comes from", text, (table, Listing(CONFIG, config)))
 
 
 def write_report(directory: Path, page: Path, *, model: Path | None = None) -> None:

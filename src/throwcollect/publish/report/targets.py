@@ -107,9 +107,7 @@ def show_targets(dataset: Dataset) -> tuple[ReportSection, ...]:
     )
     head = ("", "with a target", "measured", "median", "9 of 10 below", "largest")
     table = Table(head=head, rows=tuple(rows), number_columns=(1, 2, 3, 4, 5))
-    return (
-        ReportSection("misses", "Targets", "How targets are missed", text, ((_show_map(dataset, targets),), table)),
-    )
+    return (ReportSection("misses", "How targets are missed", text, ((_show_map(dataset, targets),), table)),)
 
 
 def _show_map(dataset: Dataset, targets: Mapping[str, NDArray[np.float64]]) -> Panel:
@@ -144,9 +142,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
     )
     if score is None:
         hint = command("score", directory)
-        return ReportSection(
-            "model", "Model", _MODEL_TITLE, f"{text} It has no score yet; {hint} tries it in simulation."
-        )
+        return ReportSection("model", _MODEL_TITLE, f"{text} It has no score yet; {hint} tries it in simulation.")
     seeds = format_count(score.seeds, "seed")
     text += f" Misses are medians of {seeds}, of {score.targets} targets each, in simulation."
     panels = [
@@ -172,7 +168,7 @@ def show_model(directory: Path, dataset: Dataset) -> ReportSection:
             y={"rangemode": "tozero"},
         )
         rows.append((*errors, there))
-    return ReportSection("model", "Model", _MODEL_TITLE, text, tuple(rows))
+    return ReportSection("model", _MODEL_TITLE, text, tuple(rows))
 
 
 def _show_misses(key: str, shown: str, model: Model, throws: Sequence[ThrowAtTarget], task: TaskConfig) -> Panel:

@@ -36,15 +36,13 @@ _MOST_PATHS = 1000
 
 @dataclass(frozen=True)
 class View:
-    """A directory for viewers that was written, and how long its throws take to watch at real speed [s]."""
+    """A directory for viewers that was written, how long its throws take to watch at real speed, and its size."""
 
     recording: Path
     layout: Path
     throws: int
-    messages: int
     duration_s: float
-    recording_bytes: int
-    mesh_bytes: int
+    size_bytes: int
 
 
 def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> View:
@@ -57,7 +55,6 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
     # The step is rounded up, so that there are never more paths than allowed.
     some = throws[:: -(-len(throws) // _MOST_PATHS)]
     config = dataset.config
-    robot = draw_robot_of(config)
     with new_directory(output) as scratch:
         path = scratch / RECORDING
         with path.open("wb") as stream:
@@ -68,18 +65,10 @@ def view(directory: Path, output: Path, trials: Iterable[int] | None = None) -> 
         information = {BAG_SECTION: bag_information([summary], recording.channels, {})}
         (scratch / METADATA).write_text(to_yaml(information), encoding="utf-8")
         (scratch / LAYOUT).write_text(json.dumps(_describe_layout(), indent=2) + "\n", encoding="utf-8")
-        robot.copy_package(scratch)
-        mesh_bytes = sum(file.stat().st_size for file in robot.meshes.values())
-        recording_bytes = path.stat().st_size
-    return View(
-        recording=output / RECORDING,
-        layout=output / LAYOUT,
-        throws=len(throws),
-        messages=summary.messages,
-        duration_s=(summary.end_ns - summary.start_ns) / 1e9,
-        recording_bytes=recording_bytes,
-        mesh_bytes=mesh_bytes,
-    )
+        draw_robot_of(config).copy_package(scratch)
+        size = sum(file.stat().st_size for file in scratch.rglob("*") if file.is_file())
+    duration_s = (summary.end_ns - summary.start_ns) / 1e9
+    return View(output / RECORDING, output / LAYOUT, len(throws), duration_s, size)
 
 
 def choose_throws(dataset: Dataset, trials: Iterable[int] | None) -> Dataset:
@@ -102,16 +91,11 @@ def _schedule(throws: Dataset) -> Iterator[tuple[ShownThrow, Samples]]:
 def _describe_layout() -> dict[str, Any]:
     """The layout, as Foxglove imports it: the scene alone."""
     camera = {
-        "perspective": True,
         "distance": 4.6,
         "phi": 72.0,
         "thetaOffset": 215.0,
-        "target": [0.0, 0.0, 0.0],
         "targetOffset": [0.5, 0.0, 1.05],
-        "targetOrientation": [0, 0, 0, 1],
-        "fovy": 45,
         "near": 0.05,
-        "far": 500,
     }
     ground = {
         "instanceId": "ground",

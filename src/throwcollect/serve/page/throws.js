@@ -10,7 +10,7 @@
  * @property {number} rate_hz
  * @property {[number, number, number] | null} landing [m], frame world
  * @property {Record<string, unknown>} values swept keys and their values
- * @property {import("./bodies.js").Body[] | null} bodies that stood around the robot; null if they are not known
+ * @property {import("./bodies.js").Body[]} bodies that stood around the robot
  * @property {Float32Array} positions [rad], joints of a sample side by side
  * @property {Float32Array} path centre of the object [m], frame world, x y z of a sample side by side
  * @property {Float32Array} moved centres [m] and quaternions of the bodies that move, the object last, 7 numbers each, frame world

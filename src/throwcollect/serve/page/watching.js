@@ -109,7 +109,7 @@ export class Watching {
       this.#fetchDescription();
     }
     station?.trails.add(shown);
-    if (shown.bodies) station?.bodies.put(shown.bodies);
+    station?.bodies.put(shown.bodies);
     if (isStored) this.map.mark(shown, this.replay.compared);
     else if (this.view.shown.includes(shown.simulation)) this.map.mark(shown);
   }

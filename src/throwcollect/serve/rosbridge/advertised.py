@@ -11,8 +11,7 @@ from throwcollect.control import GoalStatus
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import Kind, absolute_name, find_interface
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.bridge import FAREWELL_S
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge import FAREWELL_S, Client
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.operations import Answer, Offer
 
@@ -149,12 +148,13 @@ class Advertised:
         """Offer a service or an action; it replaces an earlier one of this client with the same name."""
         # A request with an unknown type must not withdraw the earlier one.
         find_interface(self._kind, asked.type)
-        self._withdraw(asked.name)
+        self.unadvertise(asked)
         self._by_name[absolute_name(asked.name)] = self._make(self._client, asked)
 
     def unadvertise(self, asked: Offer) -> None:
         """Withdraw a service or an action."""
-        self._withdraw(asked.name)
+        if (offered := self._by_name.pop(absolute_name(asked.name), None)) is not None:
+            offered.close()
 
     def take(self, answer: Answer) -> None:
         """Take what the client answers to a node."""
@@ -166,8 +166,4 @@ class Advertised:
     def close(self) -> None:
         """Withdraw everything."""
         for offered in self._by_name.values():
-            offered.close()
-
-    def _withdraw(self, name: str) -> None:
-        if (offered := self._by_name.pop(absolute_name(name), None)) is not None:
             offered.close()

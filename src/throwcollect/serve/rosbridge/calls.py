@@ -13,7 +13,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, find_interface, full_name
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge import Client
 from throwcollect.serve.rosbridge.codec import plain_values
 from throwcollect.serve.rosbridge.guarded import refuse_secrets
 from throwcollect.serve.rosbridge.operations import CallService, CancelGoal, SendGoal
@@ -34,13 +34,13 @@ async def call_node(client: Client, asked: CallService) -> Any:
     type_name = named if named in types else types[0]
     request = find_interface("srv", type_name).Request()
     fill(request, {} if asked.args is None or asked.args == [] else asked.args)
-    refuse_secrets(type_name, request)
     response = await call_service(client, service, type_name, request, asked.timeout)
     return plain_values(response, asked.compression)
 
 
 async def call_service(client: Client, service: str, type_name: str, request: Any, timeout_s: float = math.inf) -> Any:
     """Call a service of a node, given by its absolute name and the full name of its type; returns the response."""
+    refuse_secrets(type_name, request)
     caller = client.bridge.service_client(service, type_name)
     return await _ask(service, caller.service_is_ready, lambda: caller.call_async(request), timeout_s)
 

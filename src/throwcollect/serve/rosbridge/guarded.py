@@ -32,14 +32,9 @@ def open_topic(given: str) -> str:
     return topic
 
 
-def refuse_leases(parameter: str) -> None:
-    """Refuse to read or set the parameter by which the coordinator leases trials."""
-    if parameter == LEASES:
-        raise ConfigError(f"{LEASES}: only the coordinator may have this parameter, as its leases are signed")
-
-
 def refuse_secrets(type_name: str, request: Any) -> None:
     """Refuse a request to a service of this type that would read or set the parameter by which trials are leased."""
     if type_name in _PARAMETER_SERVICES:
-        for name in [*getattr(request, "names", ()), *(each.name for each in getattr(request, "parameters", ()))]:
-            refuse_leases(name)
+        names = [*getattr(request, "names", ()), *(each.name for each in getattr(request, "parameters", ()))]
+        if LEASES in names:
+            raise ConfigError(f"{LEASES}: only the coordinator may have this parameter, as its leases are signed")

@@ -25,7 +25,7 @@ Compression = Literal["none", "cbor", "cbor-raw"]
 COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
 RequestId = str | int | None
 """The id that a client has given an operation; None if it has given none."""
-MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service", "status"))
+MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service"))
 """Operations that clients may use that may only look; a call is decided on by its service."""
 Natural = Annotated[int, Field(ge=0, lt=1 << 53)]
 """A number from 0 on that JavaScript can represent."""
@@ -117,14 +117,7 @@ class Answer(Operation):
     status: int | None = None
 
 
-class Status(Operation):
-    """A status message of the client."""
-
-    op: Literal["status"]
-    msg: str = ""
-
-
-AnyOperation = Subscribe | Withdraw | Publish | CallService | SendGoal | CancelGoal | Offer | Answer | Status
+AnyOperation = Subscribe | Withdraw | Publish | CallService | SendGoal | CancelGoal | Offer | Answer
 _OPERATIONS: TypeAdapter[AnyOperation] = TypeAdapter(Annotated[AnyOperation, Field(discriminator="op")])
 
 

@@ -11,19 +11,13 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import absolute_name, is_hidden
 from throwcollect.ros.message_values import plain
+from throwcollect.serve.rosbridge.bridge import Client
 from throwcollect.serve.rosbridge.calls import call_service
-from throwcollect.serve.rosbridge.client import Client
-from throwcollect.serve.rosbridge.guarded import refuse_leases
 from throwcollect.serve.rosbridge.operations import Arguments
 
 _TIMEOUT_S = 5.0
 _NOT_SET = 0
 """Of rcl_interfaces/msg/ParameterType."""
-_TYPES = {
-    "get_parameters": "rcl_interfaces/srv/GetParameters",
-    "set_parameters": "rcl_interfaces/srv/SetParameters",
-    "list_parameters": "rcl_interfaces/srv/ListParameters",
-}
 
 
 Values = dict[str, object]
@@ -58,7 +52,7 @@ async def set_parameter(client: Client, asked: Arguments) -> Values:
         ros.Parameter(name, value=value)
     except (TypeError, ValueError) as error:
         raise ConfigError(f"{asked.name}: value should be that of a parameter in JSON: {error}") from error
-    if not _offers(client, node, "set_parameters"):
+    if not _offers(client, node, "set"):
         raise ConfigError(f"{node}: there is no such node, or it has no services for its parameters")
     current = await _read(client, asked.name)
     first = next(iter(current), None) if isinstance(current, list | tuple) or hasattr(current, "tolist") else current
@@ -66,7 +60,7 @@ async def set_parameter(client: Client, asked: Arguments) -> Values:
     if isinstance(first, float):
         value = _as_floats(value)
     parameter = ros.Parameter(name, value=value).to_parameter_msg()
-    (result,) = (await _call(client, node, "set_parameters", parameters=[parameter])).results
+    (result,) = (await _call(client, node, "set", parameters=[parameter])).results
     if not result.successful:
         raise ConfigError(f"{node}:{name}: {result.reason}")
     return {"successful": True, "reason": result.reason}
@@ -76,10 +70,10 @@ async def list_parameters(client: Client, _: Arguments) -> Values:
     """Answer with the names of the parameters of all nodes that answer in time."""
     names, end = [], time.monotonic() + _TIMEOUT_S
     for service, types in client.bridge.node.get_service_names_and_types():
-        if _TYPES["list_parameters"] in types and not is_hidden(service):
+        if "rcl_interfaces/srv/ListParameters" in types and not is_hidden(service):
             node, left_s = service.rpartition("/")[0], end - time.monotonic()
             try:
-                response = await _call(client, node, "list_parameters", timeout_s=max(left_s, 0.1))
+                response = await _call(client, node, "list", timeout_s=max(left_s, 0.1))
             except ConfigError:
                 continue
             names += [f"{node}:{name}" for name in response.result.names]
@@ -89,20 +83,21 @@ async def list_parameters(client: Client, _: Arguments) -> Values:
 async def _read(client: Client, given: str) -> Any:
     """Value of a parameter, which is None if there is no such node or parameter."""
     node, name = _split_name(given)
-    if not _offers(client, node, "get_parameters"):
+    if not _offers(client, node, "get"):
         return None
-    response = await _call(client, node, "get_parameters", names=[name])
+    response = await _call(client, node, "get", names=[name])
     values = [ros.parameter_value_to_python(each) for each in response.values if each.type != _NOT_SET]
     return values[0] if values else None
 
 
-async def _call(client: Client, node: str, service: str, *, timeout_s: float = _TIMEOUT_S, **fields: Any) -> Any:
-    request = ros.get_service(_TYPES[service]).Request(**fields)
-    return await call_service(client, f"{node}/{service}", _TYPES[service], request, timeout_s)
+async def _call(client: Client, node: str, verb: str, *, timeout_s: float = _TIMEOUT_S, **fields: Any) -> Any:
+    type_name = f"rcl_interfaces/srv/{verb.capitalize()}Parameters"
+    request = ros.get_service(type_name).Request(**fields)
+    return await call_service(client, f"{node}/{verb}_parameters", type_name, request, timeout_s)
 
 
-def _offers(client: Client, node: str, service: str) -> bool:
-    return f"{node}/{service}" in dict(client.bridge.node.get_service_names_and_types())
+def _offers(client: Client, node: str, verb: str) -> bool:
+    return f"{node}/{verb}_parameters" in dict(client.bridge.node.get_service_names_and_types())
 
 
 def _split_name(given: str) -> tuple[str, str]:
@@ -111,7 +106,6 @@ def _split_name(given: str) -> tuple[str, str]:
     if not name:
         expected = "node:parameter, such as /sim_0:ball.mass_kg"
         raise ConfigError(f"{given!r} is no name of a parameter", expected=expected)
-    refuse_leases(name)
     return absolute_name(node), name
 
 

@@ -10,9 +10,8 @@ from typing import Any
 
 from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.serve.rosbridge.advertised import Advertised
-from throwcollect.serve.rosbridge.bridge import Bridge
+from throwcollect.serve.rosbridge.bridge import Bridge, Client
 from throwcollect.serve.rosbridge.calls import Goals, call_node
-from throwcollect.serve.rosbridge.client import Client
 from throwcollect.serve.rosbridge.codec import Frame, read_frame
 from throwcollect.serve.rosbridge.operations import MAY_READ, Arguments, CallService, read_fields, read_operation
 from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, make_services
@@ -59,7 +58,6 @@ class Requests(Client):
             "action_feedback": actions.take,
             "action_result": actions.take,
             "action_status": actions.take,
-            "status": lambda asked: _logger.info("a client reports: %s", asked.msg),
         }
 
     @property

@@ -12,12 +12,12 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.robots.urdf import PACKAGE
 from throwcollect.ros.graph_names import absolute_name, full_name, is_hidden
+from throwcollect.ros.message_values import plain
 from throwcollect.serve.robot_files import find_mesh
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge import Client
 from throwcollect.serve.rosbridge.guarded import is_guarded
 from throwcollect.serve.rosbridge.operations import Arguments
 from throwcollect.serve.rosbridge.parameters import get_parameter, has_parameter, list_parameters, set_parameter
-from throwcollect.units import NS_PER_S
 
 Service = Callable[[Arguments], Any]
 """Makes the fields of the response from the arguments, now or when it is awaited."""
@@ -30,85 +30,74 @@ SET_PARAMETER = "rosapi/set_param"
 
 def make_services(client: Client) -> Mapping[str, Service]:
     """Services that the bridge answers for a client, by their names without a slash at the beginning."""
-    graph = {f"rosapi/{name}": service for name, service in _Graph(client.bridge.node).services().items()}
-    return {
-        **graph,
-        "rosapi/get_param": partial(get_parameter, client),
-        "rosapi/has_param": partial(has_parameter, client),
-        "rosapi/get_param_names": partial(list_parameters, client),
-        SET_PARAMETER: partial(set_parameter, client),
-        "file_server/get_file": _give_file,
+    node = client.bridge.node
+    # What is reported of the graph leaves out hidden names, and topics that clients may not have.
+    graph: dict[str, Service] = {
+        "topics": lambda _: _list_topics(_find_topics(node)),
+        "topics_and_raw_types": lambda _: {
+            **_list_topics(topics := _find_topics(node)),
+            "typedefs_full_text": [_find_definition(type_name) for type_name in topics.values()],
+        },
+        "topics_for_type": lambda asked: {"topics": _names_of(_find_topics(node), full_name("msg", asked.type))},
+        "topic_type": lambda asked: {"type": _find_topics(node).get(absolute_name(asked.topic), "")},
+        "services": lambda _: {"services": list(_find_services(node))},
+        "services_for_type": lambda asked: {"services": _names_of(_find_services(node), full_name("srv", asked.type))},
+        "service_type": lambda asked: {"type": _find_services(node).get(absolute_name(asked.service), "")},
+        "action_servers": lambda _: {"action_servers": _find_actions(node)},
+        "nodes": lambda _: {"nodes": [join(namespace, name) for name, namespace in _find_nodes(node)]},
+        "node_details": lambda asked: _describe_node(node, asked.node),
+        "get_time": lambda _: {"time": plain(node.get_clock().now().to_msg())},
+        "get_ros_version": lambda _: {"version": 2, "distro": "jazzy"},
+        "get_param": partial(get_parameter, client),
+        "has_param": partial(has_parameter, client),
+        "get_param_names": partial(list_parameters, client),
+        "set_param": partial(set_parameter, client),
     }
+    return {**{f"rosapi/{name}": service for name, service in graph.items()}, "file_server/get_file": _give_file}
 
 
-class _Graph:
-    """What rosapi reports of the graph; it leaves out hidden names, and topics that clients may not have."""
+def _find_topics(node: ros.Node) -> dict[str, str]:
+    """Topics that clients may have, with their types."""
+    topics = _list_visible(node.get_topic_names_and_types())
+    return {name: types[0] for name, types in topics if not is_guarded(name)}
 
-    def __init__(self, node: ros.Node) -> None:
-        self._node = node
 
-    def services(self) -> Mapping[str, Service]:
-        """Services by their names."""
-        return {
-            "topics": lambda _: self._list_topics(),
-            "topics_and_raw_types": lambda _: {
-                **self._list_topics(),
-                "typedefs_full_text": [_find_definition(type_name) for type_name in self._topics().values()],
-            },
-            "topics_for_type": lambda asked: {"topics": _names_of(self._topics(), full_name("msg", asked.type))},
-            "topic_type": lambda asked: {"type": self._topics().get(absolute_name(asked.topic), "")},
-            "services": lambda _: {"services": list(self._services())},
-            "services_for_type": lambda asked: {"services": _names_of(self._services(), full_name("srv", asked.type))},
-            "service_type": lambda asked: {"type": self._services().get(absolute_name(asked.service), "")},
-            "action_servers": lambda _: self._list_actions(),
-            "nodes": lambda _: {"nodes": [join(namespace, name) for name, namespace in self._nodes()]},
-            "node_details": lambda asked: self._describe_node(asked.node),
-            "get_time": lambda _: self._get_time(),
-            "get_ros_version": lambda _: {"version": 2, "distro": "jazzy"},
-        }
+def _list_topics(topics: Mapping[str, str]) -> Values:
+    return {"topics": list(topics), "types": list(topics.values())}
 
-    def _topics(self) -> dict[str, str]:
-        """Topics that clients may have, with their types."""
-        topics = _list_visible(self._node.get_topic_names_and_types())
-        return {name: types[0] for name, types in topics if not is_guarded(name)}
 
-    def _services(self) -> dict[str, str]:
-        return {name: types[0] for name, types in _list_visible(self._node.get_service_names_and_types())}
+def _find_services(node: ros.Node) -> dict[str, str]:
+    return {name: types[0] for name, types in _list_visible(node.get_service_names_and_types())}
 
-    def _nodes(self) -> list[tuple[str, str]]:
-        """Names and namespaces."""
-        found = sorted(set(self._node.get_node_names_and_namespaces()))
-        return [(name, namespace) for name, namespace in found if not is_hidden(join(namespace, name))]
 
-    def _list_topics(self) -> Values:
-        topics = self._topics()
-        return {"topics": list(topics), "types": list(topics.values())}
+def _find_nodes(node: ros.Node) -> list[tuple[str, str]]:
+    """Names and namespaces."""
+    found = sorted(set(node.get_node_names_and_namespaces()))
+    return [(name, namespace) for name, namespace in found if not is_hidden(join(namespace, name))]
 
-    def _list_actions(self) -> Values:
-        actions = [name for name, _ in _list_visible(ros.get_action_names_and_types(self._node))]
-        # On DDS, the graph also names services that nodes want to call and that no node offers.
-        offered = {
-            service
-            for node in self._node.get_node_names_and_namespaces()
-            for service, _ in self._node.get_service_names_and_types_by_node(*node)
-        }
-        return {"action_servers": [name for name in actions if f"{name}/_action/send_goal" in offered]}
 
-    def _describe_node(self, asked: str) -> Values:
-        namespace, _, name = absolute_name(asked).rpartition("/")
-        owner, node = (name, namespace or "/"), self._node
-        if owner not in self._nodes():
-            # As in the original rosapi, a client that asks for all nodes in turn must not fail if one has just ended.
-            return {"subscribing": [], "publishing": [], "services": []}
-        return {
-            "subscribing": [each for each, _ in _list_visible(node.get_subscriber_names_and_types_by_node(*owner))],
-            "publishing": [each for each, _ in _list_visible(node.get_publisher_names_and_types_by_node(*owner))],
-            "services": [each for each, _ in _list_visible(node.get_service_names_and_types_by_node(*owner))],
-        }
+def _find_actions(node: ros.Node) -> list[str]:
+    # On DDS, the graph also names services that nodes want to call and that no node offers.
+    offered = {
+        service
+        for owner in node.get_node_names_and_namespaces()
+        for service, _ in node.get_service_names_and_types_by_node(*owner)
+    }
+    actions = _list_visible(ros.get_action_names_and_types(node))
+    return [name for name, _ in actions if f"{name}/_action/send_goal" in offered]
 
-    def _get_time(self) -> Values:
-        seconds, nanoseconds = divmod(self._node.get_clock().now().nanoseconds, NS_PER_S)
-        return {"time": {"sec": seconds, "nanosec": nanoseconds}}
+
+def _describe_node(node: ros.Node, asked: str) -> Values:
+    namespace, _, name = absolute_name(asked).rpartition("/")
+    owner = name, namespace or "/"
+    if owner not in _find_nodes(node):
+        # As in the original rosapi, a client that asks for all nodes in turn must not fail if one has just ended.
+        return {"subscribing": [], "publishing": [], "services": []}
+    return {
+        "subscribing": [each for each, _ in _list_visible(node.get_subscriber_names_and_types_by_node(*owner))],
+        "publishing": [each for each, _ in _list_visible(node.get_publisher_names_and_types_by_node(*owner))],
+        "services": [each for each, _ in _list_visible(node.get_service_names_and_types_by_node(*owner))],
+    }
 
 
 def _list_visible(found: Found) -> list[tuple[str, list[str]]]:

@@ -9,8 +9,7 @@ from typing import Any
 from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.bridge import Sample
-from throwcollect.serve.rosbridge.client import Client
+from throwcollect.serve.rosbridge.bridge import Client, Sample
 from throwcollect.serve.rosbridge.guarded import open_topic
 from throwcollect.serve.rosbridge.operations import COMPRESSIONS, Publish, RequestId, Subscribe, Withdraw
 

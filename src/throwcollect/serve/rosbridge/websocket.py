@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Coroutine
+from collections.abc import AsyncIterator, Coroutine
 from contextlib import suppress
 from typing import Any
 
@@ -14,7 +14,7 @@ from starlette.websockets import WebSocket
 from throwcollect.serve.rosbridge.bridge import Bridge
 from throwcollect.serve.rosbridge.codec import Frame, json_text
 from throwcollect.serve.rosbridge.requests import Requests
-from throwcollect.serve.sockets import keep_sending
+from throwcollect.serve.sockets import keep_sending, send_all
 
 MOST_FRAMES = 1000
 MOST_BYTES = 32 * 2**20
@@ -47,14 +47,14 @@ class Outbox:
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(self._append, frame)
 
-    async def take(self) -> Frame:
-        """Take the oldest frame, as soon as there is one."""
-        await self._filled.wait()
-        frame = self._frames.popleft()
-        self._bytes -= len(frame)
-        if not self._frames:
-            self._filled.clear()
-        return frame
+    async def take_all(self) -> AsyncIterator[Frame]:
+        """Take the oldest frame, as soon as there is one, again and again."""
+        while await self._filled.wait():
+            frame = self._frames.popleft()
+            self._bytes -= len(frame)
+            if not self._frames:
+                self._filled.clear()
+            yield frame
 
     def _append(self, frame: Frame) -> None:
         self._frames.append(frame)
@@ -81,15 +81,6 @@ async def attend(websocket: WebSocket, bridge: Bridge, *until: Coroutine[Any, An
             await asyncio.sleep(_POLL_S)
 
     try:
-        await keep_sending(websocket, _send_all(websocket, outbox), *until, hear=hear)
+        await keep_sending(websocket, send_all(websocket, outbox.take_all()), *until, hear=hear)
     finally:
         client.close()
-
-
-async def _send_all(websocket: WebSocket, outbox: Outbox) -> None:
-    while True:
-        frame = await outbox.take()
-        if isinstance(frame, str):
-            await websocket.send_text(frame)
-        else:
-            await websocket.send_bytes(frame)

@@ -24,7 +24,6 @@ from throwcollect.dataset.reader import Dataset
 from throwcollect.errors import ConfigError, DatasetError, MemberError
 from throwcollect.members import load_member
 from throwcollect.publish.export.export import export
-from throwcollect.publish.export.throw_source import unit_of
 
 PLUGINS = Path(__file__).parents[3] / "plugins"
 
@@ -101,22 +100,6 @@ def test_a_rate_that_does_not_divide_the_recorded_one_is_refused(rate_hz: int, s
     ):
         export(source, tmp_path / "out", to="npz", rate_hz=rate_hz)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("column", "unit"),
-    [
-        ("landing_x_m", "m"),
-        ("landing_vx_mps", "m/s"),
-        ("release_time_s", "s"),
-        ("hit_angle_rad", "rad"),
-        ("effort_peak_share", "1"),
-        ("joint_effort_nm", "N m"),
-        ("command_acceleration_radps2", "rad/s^2"),
-    ],
-)
-def test_the_unit_of_a_column_follows_from_its_name(column: str, unit: str) -> None:
-    assert unit_of(column) == unit
 
 
 @pytest.fixture

@@ -56,5 +56,6 @@ def test_datasets_in_the_hdf5_file_state_their_units_and_components(exported: Ex
         )
         assert actions["description"].endswith("One sample later.")
         assert file["throws/landing_x_m"].attrs["unit"] == "m"
+        assert file["data/demo_0/command_acceleration_radps2"].attrs["unit"] == "rad/s^2"
         assert file.attrs["digest_of_dataset"] == info(source).digest
         assert Config.model_validate_json(file.attrs["config"]) == Dataset.open(source).config

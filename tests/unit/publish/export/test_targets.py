@@ -11,7 +11,6 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.io import loadmat
 from tests.unit.dataset.targeted import LIST, collect_targeted
-from tests.unit.publish.export.conftest import FORMATS
 
 from throwcollect.publish.export.export import export
 
@@ -35,12 +34,9 @@ def partly(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return collect_targeted(tmp_path_factory.mktemp("some") / "data")
 
 
-@pytest.mark.parametrize("to", FORMATS)
-def test_every_format_says_whether_all_throws_have_targets(
-    targeted: Path, partly: Path, tmp_path: Path, to: str
-) -> None:
-    export(targeted, tmp_path / "all", to=to)
-    export(partly, tmp_path / "some", to=to)
+def test_a_card_says_whether_all_throws_have_targets(targeted: Path, partly: Path, tmp_path: Path) -> None:
+    export(targeted, tmp_path / "all", to="npz")
+    export(partly, tmp_path / "some", to="npz")
     cards = [(tmp_path / name / "README.md").read_text() for name in ("all", "some")]
     assert "Every throw has a target, `target_x_m`, `target_y_m`, which is the same in all its samples" in cards[0]
     assert "Not every throw has a target" in cards[1]

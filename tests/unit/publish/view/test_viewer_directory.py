@@ -61,14 +61,12 @@ def fields(array: Any, *names: str) -> list[float]:
 
 def test_every_record_of_the_recording_is_sound(written: View) -> None:
     examined = Examination(written.recording)
-    assert len(examined.times) == written.messages
     assert examined.times[-1] - examined.times[0] == round(written.duration_s * 1e9)
 
 
 def test_the_view_directory_is_a_rosbag(written: View) -> None:
     with Reader(written.recording.parent) as bag:
         counts = {connection.topic: connection.msgcount for connection in bag.connections}
-    assert sum(counts.values()) == written.messages
     assert {
         counts[topic] for topic in ("/robot_description", "/view/robot", "/view/tool", "/tf_static", "/view/throws")
     } == {1}
@@ -131,7 +129,7 @@ def test_meshes_beside_the_recording_are_where_the_description_says(written: Vie
     directory = written.recording.parent
     assert len(urls) > 20
     assert all((directory / url).read_bytes() == (TALOS.share() / url).read_bytes() for url in urls)
-    assert sum((directory / url).stat().st_size for url in urls) == written.mesh_bytes
+    assert sum(file.stat().st_size for file in directory.rglob("*") if file.is_file()) == written.size_bytes
     for package in {url.split("/")[0] for url in urls}:
         assert ElementTree.parse(directory / package / "package.xml").findtext("name") == package  # noqa: S314
     assert "<collision" not in description

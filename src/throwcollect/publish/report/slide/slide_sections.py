@@ -20,7 +20,7 @@ def report_slides(dataset: Dataset, outcomes: Outcomes) -> TaskReport:
 def _show_rests(dataset: Dataset, slides: Points, outcomes: Outcomes) -> ReportSection:
     title = "Where the pucks rest"
     if not len(slides):
-        return ReportSection("rest", "Rests", title, "No puck left the tool and came to rest on the table.")
+        return ReportSection("rest", title, "No puck left the tool and came to rest on the table.")
     x, y = slides.x_m, slides.y_m
     text = (
         f"{outcomes.succeeded:,} of {len(outcomes.codes):,} pucks {outcomes.verbs[1]} after one push. "
@@ -29,4 +29,4 @@ def _show_rests(dataset: Dataset, slides: Points, outcomes: Outcomes) -> ReportS
     )
     figure = draw_map(slides, outcomes, looks_of(dataset.config), speed="speed after the push")
     note = "The table, and the puck before the push, are those of the configuration."
-    return ReportSection("rest", "Rests", title, text, ((Panel("map", "Rests from above", figure, note),),))
+    return ReportSection("rest", title, text, ((Panel("map", "Rests from above", figure, note),),))

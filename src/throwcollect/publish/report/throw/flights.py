@@ -43,9 +43,7 @@ def show_physics(distance_m: NDArray[np.float64], episodes: int) -> ReportSectio
     title = "Whether flights obey physics"
     finite_m = distance_m[np.isfinite(distance_m)]
     if not len(finite_m):
-        return ReportSection(
-            "physics", "Physics", title, "No flight was long enough to compare it with ballistic motion."
-        )
+        return ReportSection("physics", title, "No flight was long enough to compare it with ballistic motion.")
     compared = "All episodes"
     if episodes > MOST_RESIDUALS:
         compared = f"{MOST_RESIDUALS:,} of {episodes:,} episodes, chosen at random,"
@@ -64,7 +62,7 @@ def show_physics(distance_m: NDArray[np.float64], episodes: int) -> ReportSectio
         text += f"None departs by more than the tolerance of {BALLISTIC_TOLERANCE_M:g} m (dashed)."
     heading = "Largest distance of each flight from ballistic motion"
     panel = Panel("residuals", heading, _draw_residuals(finite_m))
-    return ReportSection("physics", "Physics", title, text, ((panel,),))
+    return ReportSection("physics", title, text, ((panel,),))
 
 
 def _draw_residuals(distance_m: NDArray[np.float64]) -> go.Figure:

@@ -62,7 +62,7 @@ def _show_landings(
     """Show where balls crossed the landing plane; `planned` are those that were thrown as planned, also by `cells`."""
     title = "Where the balls land"
     if not len(landings):
-        return ReportSection("landing", "Landings", title, f"No ball crossed the {_name_plane(outcomes)}.")
+        return ReportSection("landing", title, f"No ball crossed the {_name_plane(outcomes)}.")
     text = f"{outcomes.succeeded:,} of {len(outcomes.codes):,} throws {outcomes.verbs[1]}"
     if len(planned):
         if outcomes.success != "landed":
@@ -78,7 +78,7 @@ def _show_landings(
     if len({body.name for body in bodies}) < len(bodies):
         notes.append("Bodies differ from throw to throw; those of a few throws are drawn.")
     above = Panel("map", "Landings from above", figure, " ".join(filter(None, notes)))
-    return ReportSection("landing", "Landings", title, text, ((above, *cells),))
+    return ReportSection("landing", title, text, ((above, *cells),))
 
 
 def _show_cells(planned: Points, throws: pa.Table, target: TargetConfig | None, succeeded: str) -> Iterator[Panel]:
@@ -105,7 +105,7 @@ def _show_releases(landings: Points, elevation_deg: NDArray[np.float64], outcome
     """Show speed and direction of flight at release, above the horizontal."""
     title = "How the balls are released"
     if not len(landings):
-        return ReportSection("release", "Release", title, f"No ball crossed the {_name_plane(outcomes)}.")
+        return ReportSection("release", title, f"No ball crossed the {_name_plane(outcomes)}.")
     middle = np.median(elevation_deg)
     text = (
         f"Of the balls that crossed the {_name_plane(outcomes)}, the median speed is "
@@ -121,7 +121,7 @@ def _show_releases(landings: Points, elevation_deg: NDArray[np.float64], outcome
     )
     figure.update_xaxes(title="release speed [m/s]").update_yaxes(title="release elevation [°]")
     panel = Panel("map", "Speed and elevation at release", figure.update_layout(height=420), _describe_choice(landings))
-    return ReportSection("release", "Release", title, text, ((panel,),))
+    return ReportSection("release", title, text, ((panel,),))
 
 
 def _describe_choice(landings: Points) -> str:
