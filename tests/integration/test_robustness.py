@@ -168,8 +168,8 @@ def ask(session: Any, key: str, payload: bytes, attachment: bytes | None, unansw
 
 
 def assert_works(robot: Robot) -> None:
-    """A trial as a coordinator has it, from the parameters to the result."""
-    assert robot.set({"sim.real_time_factor": 0.0, "trial.controllers": [""]}).successful
+    """A motion as a client has it, from the parameters to the result."""
+    assert robot.set({"sim.real_time_factor": 0.0}).successful
     if robot.state() != PLAYING:
         robot.put_into(PLAYING)
     robot.reset()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,56 +25,33 @@ NO_TRIAL = -1
 """Number of the trial while none is set up."""
 
 
-@dataclass(frozen=True)
-class TrialSetup:
-    """The trial that the next reset prepares.
-
-    Attributes:
-        number: Number of the trial; negative for none.
-        controllers: Controllers that must have a goal before the clock runs; with none, any goal starts it.
-        config: Configuration with the trial's values.
-    """
-
-    number: int
-    controllers: tuple[str, ...]
-    config: Config
-
-
 class PresentTrial:
     """The trial of a simulation, without the physics.
 
     Attributes:
-        setup: The trial that the next reset prepares.
-        begun: The trial that the last reset has prepared.
-        motion: Motion of a trial that `Simulator.begin` has begun, until its episode is handed over; None for a trial
-            that a client has set up.
+        number: Number of the trial that is set up; `NO_TRIAL` if none is.
+        config: Configuration that the next reset prepares: that of the trial or, without one, what clients have set.
+        motion: Motion of a trial that `Simulator.begin` has begun, until its episode is handed over; otherwise None.
     """
 
     def __init__(self, config: Config) -> None:
-        self.setup = self.begun = TrialSetup(NO_TRIAL, (), config)
-        self.motion: JointTrajectory | None = None
-        self._config = config
+        self._configured = config
         self._goals: dict[str, GoalOutcome] = {}
+        self.set_up_nothing()
 
     def set_up_nothing(self) -> None:
         """End the lease, and let the next reset go back to the configuration."""
-        self.motion = None
-        self.setup = TrialSetup(NO_TRIAL, (), self._config)
+        self.motion: JointTrajectory | None = None
+        self.number, self.config = NO_TRIAL, self._configured
 
-    def begin(self) -> None:
-        """Begin the trial that is set up, and forget the goals of the previous trial."""
-        self.begun = self.setup
+    def forget_goals(self) -> None:
+        """Forget the goals of the previous trial."""
         self._goals = {}
 
     @property
     def leased(self) -> bool:
         """Whether the trial belongs to a coordinator; meanwhile, no other client may change anything."""
         return self.motion is not None
-
-    @property
-    def has_all_goals(self) -> bool:
-        """Whether every controller that must have a goal before the clock runs has had one."""
-        return all(name in self._goals for name in self.begun.controllers)
 
     def require_free(self) -> None:
         """Refuse a request that would change a leased trial."""
@@ -85,7 +61,7 @@ class PresentTrial:
     @property
     def lease_in_words(self) -> str:
         """Sentence by which requests are refused while the simulation is leased."""
-        return f"the simulation is leased for trial {self.setup.number}, until its episode is handed over"
+        return f"the simulation is leased for trial {self.number}, until its episode is handed over"
 
     @property
     def refusal(self) -> TrajectoryRefusal | None:

@@ -34,11 +34,6 @@ class LeaseQueue:
                 self._simulator.drop()
         self._waiting = deque(lease for lease in pending if lease is not self._running)
 
-    def clear(self) -> None:
-        """Forget all leases; the trial that runs goes on."""
-        self._running = None
-        self._waiting.clear()
-
     def begin_next(self) -> TrialRefusal | None:
         """Begin the next trial if none runs; return the refusal of a trial that cannot begin."""
         if self._running is not None or not self._waiting:
@@ -68,7 +63,6 @@ class LeaseQueue:
             # Only episodes of leased trials are judged, so only they can be refused.
             lease, self._running = self._running, None
             return self._refuse(lease, error) if lease else None
-        # The episode of a trial that a client has set up by hand belongs to no lease.
         if episode is not None and self._running is not None:
             self._done.append(self._running.token)
             self._running = None

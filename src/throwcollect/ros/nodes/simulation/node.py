@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from throwcollect.config.key import Effect
 from throwcollect.config.schema import FASTEST, SLOWEST, Config
-from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import pack
@@ -40,7 +39,6 @@ from throwcollect.ros.nodes.simulation.spawning import SpawningServices
 from throwcollect.ros.nodes.simulation.stepping import Stepping
 from throwcollect.run_key import Signer
 from throwcollect.sim.live import LiveSimulator, StateCode
-from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -50,10 +48,6 @@ _CLOCK = "rosgraph_msgs/msg/Clock"
 Clock: Any = get_message(_CLOCK)
 
 _EPISODE = "episode"
-NUMBER, CONTROLLERS = "trial.number", "trial.controllers"
-"""Parameters that set up a trial by hand."""
-_NO_CONTROLLERS = [""]
-"""Value of the parameter for no controllers; a list with nothing in it would not tell the type of its elements."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -109,7 +103,6 @@ class SimulationNode(Node):
         self._published_at = 0.0
         self._published_ns = -1
         self._signer = Signer.of_environment()
-        self._restoring = False
         self._requested: tuple[Lease, ...] = ()
         SimulationControl(self, simulation)
         SpawningServices(self, simulation)
@@ -205,7 +198,7 @@ class SimulationNode(Node):
     def _rests(self) -> bool:
         """Whether time stands still for lack of work; never during a trial, of which each sample is published once."""
         simulation = self._simulation
-        return simulation.state == StateCode.PLAYING and not simulation.running and simulation.trial.begun.number < 0
+        return simulation.state == StateCode.PLAYING and not simulation.running and not simulation.trial.leased
 
     def _publish_steps(self, samples: Samples) -> None:
         """Publish the time after the steps of a paused simulation, because they may end between two samples."""
@@ -251,11 +244,6 @@ class SimulationNode(Node):
         physics = set(sweepable_keys(config, Effect.PHYSICS))
         shown = {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.effect not in _HIDDEN}
         self._physics = {key: float(value) for key, value in shown.items() if key in physics}
-        numbers = [descriptors.integer_range(NO_TRIAL, MOST_TRIALS - 1)]
-        about_number = "Number of the trial that the next reset begins, from 0; -1 for none, which also ends a lease."
-        self.declare_parameter(NUMBER, NO_TRIAL, ParameterDescriptor(description=about_number, integer_range=numbers))
-        about_controllers = "Controllers that must have a goal before the clock of a trial runs; with none, any goal."
-        self.declare_parameter(CONTROLLERS, _NO_CONTROLLERS, ParameterDescriptor(description=about_controllers))
         about_leases = "Trials that a coordinator wants, in JSON with its signatures, instead of those before."
         self.declare_parameter(LEASES, "", ParameterDescriptor(description=about_leases))
         factor = config.sim.real_time_factor or _NO_LIMIT
@@ -282,7 +270,7 @@ class SimulationNode(Node):
                 # Trials begin only in `_take_leases`, because a callback that is called after this one may still refuse
                 # the parameters.
                 self._requested = self._read_leases(values)
-            elif not self._restoring:
+            else:
                 self._prepare(values)
         except (ConfigError, DatasetError) as error:
             return SetParametersResult(successful=False, reason=str(error))
@@ -313,20 +301,12 @@ class SimulationNode(Node):
             self._episodes.publish(pack(refusal, self._signer))
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
-        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease."""
+        """Set up the physics that the next reset prepares, unless the simulation is leased."""
         trial = self._simulation.trial
         changed = [name for name in values if name not in _NOT_RECORDED]
-        if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
-            self._leases.clear()
-            trial.set_up_nothing()
-        elif trial.leased and changed:
+        if trial.leased and changed:
             raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
-        controllers = tuple(filter(None, values.get(CONTROLLERS, trial.setup.controllers)))
-        if unknown := [name for name in controllers if name not in self._simulation.limbs]:
-            raise ConfigError(f"no controller {unknown[0]!r}")
-        config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
-        if changed:
-            trial.setup = TrialSetup(int(values.get(NUMBER, trial.setup.number)), controllers, config)
+        trial.config = with_values(trial.config, {key: values[key] for key in self._physics if key in values})
 
     def _check_factor(self, factor: float) -> None:
         if factor != _NO_LIMIT and not SLOWEST <= factor <= FASTEST:
@@ -345,17 +325,11 @@ class SimulationNode(Node):
         """Undo what clients have changed of the parameters; of the real-time factor, only slow motion is undone."""
         for controller in self._controllers.values():
             controller.parameter_server.restore()
-        configured = {NUMBER: NO_TRIAL, CONTROLLERS: _NO_CONTROLLERS, **self._physics}
-        stray = {key: value for key, value in configured.items() if self.get_parameter(key).value != value}
+        stray = {key: value for key, value in self._physics.items() if self.get_parameter(key).value != value}
         if self._hangs(self.get_parameter(_FACTOR).value):
             stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
         if stray:
-            # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these parameters.
-            self._restoring = True
-            try:
-                self.set_parameters([Parameter(key, value=value) for key, value in stray.items()])
-            finally:
-                self._restoring = False
+            self.set_parameters_atomically([Parameter(key, value=value) for key, value in stray.items()])
 
 
 def record_all_topics(config: Config) -> Config:

@@ -138,13 +138,6 @@ def test_an_episode_without_a_lease_is_handed_over_as_well() -> None:
     assert queue.hand_over() == "an episode"
 
 
-def test_leases_that_are_cleared_are_forgotten() -> None:
-    queue, runner = queue_of(A, B)
-    queue.clear()
-    assert queue.begin_next() is None
-    assert (runner.begun, runner.dropped) == ([0], 0)
-
-
 def test_a_trial_in_which_the_engine_fails_is_dropped_and_refused() -> None:
     queue, runner = queue_of(A, B)
     assert queue.fail(ThrowcollectError("broken")) == TrialRefusal(A.trial, "broken")
