@@ -27,7 +27,6 @@ from throwcollect.ros import (
     QoSProfile,
     Time,
     get_message,
-    graph_changes,
     provide_time,
 )
 from throwcollect.ros.msg import SetParametersResult, String, UInt8MultiArray
@@ -99,7 +98,6 @@ class SimulationNode(Node):
         self._manager = ControllerManager(self, simulation)
         self._listened: list[tuple[Topic, Publisher]] = []
         self._subscribed: list[ControllerNode] = []
-        self._noticed_changes = -1
         self._published_at = 0.0
         self._published_ns = -1
         self._signer = Signer.of_environment()
@@ -214,11 +212,7 @@ class SimulationNode(Node):
                 publisher.publish(message)
 
     def _notice_listeners(self) -> None:
-        """Find out which topics have subscribers, if the graph has changed since the last time."""
-        changes = graph_changes(self)
-        if changes == self._noticed_changes:
-            return
-        self._noticed_changes = changes
+        """Find out which topics have subscribers."""
         self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
         self._subscribed = [controller for controller in self._controllers.values() if controller.has_subscribers]
         self._simulation.watch(controller.controller for controller in self._subscribed if controller.wants_states)
