@@ -1,8 +1,8 @@
-"""The trial that a simulation is set up for: its lease, and the goals of its controllers with their results."""
+"""The trial that a simulation is set up for: its lease, and the goals of its controllers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,10 @@ from numpy.typing import NDArray
 from throwcollect.config.schema import Config
 from throwcollect.control import (
     ErrorCode,
-    GoalResult,
-    GoalStatus,
     Trajectory,
     TrajectoryGoal,
     TrajectoryRefusal,
 )
-from throwcollect.episode.record import GoalOutcome
 from throwcollect.errors import RequestError
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory
@@ -36,17 +33,12 @@ class PresentTrial:
 
     def __init__(self, config: Config) -> None:
         self._configured = config
-        self._goals: dict[str, GoalOutcome] = {}
         self.set_up_nothing()
 
     def set_up_nothing(self) -> None:
         """End the lease, and let the next reset go back to the configuration."""
         self.motion: JointTrajectory | None = None
         self.number, self.config = NO_TRIAL, self._configured
-
-    def forget_goals(self) -> None:
-        """Forget the goals of the previous trial."""
-        self._goals = {}
 
     @property
     def leased(self) -> bool:
@@ -67,20 +59,6 @@ class PresentTrial:
     def refusal(self) -> TrajectoryRefusal | None:
         """Refusal of goals and trajectories while the simulation is leased; otherwise None."""
         return TrajectoryRefusal(ErrorCode.INVALID_GOAL, self.lease_in_words) if self.leased else None
-
-    def note_goal(self, controller: str) -> None:
-        """Note that a controller has accepted a goal."""
-        self._goals[controller] = GoalOutcome(controller, GoalStatus.EXECUTING, 0, "")
-
-    def note_result(self, controller: str, result: GoalResult) -> None:
-        """Note that the goal of a controller has ended."""
-        if controller in self._goals:
-            outcome = GoalOutcome(controller, result.status, result.error_code, result.error_string)
-            self._goals[controller] = outcome
-
-    def outcomes(self, controllers: Iterable[str]) -> tuple[GoalOutcome, ...]:
-        """Return the outcomes of the goals of these controllers, in their order."""
-        return tuple(self._goals[name] for name in controllers if name in self._goals)
 
 
 def trial_goals(robot: Robot, trajectory: JointTrajectory, posture: Mapping[str, float]) -> dict[str, TrajectoryGoal]:

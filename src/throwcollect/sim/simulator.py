@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.control import GoalResult, TrajectoryGoal, TrajectoryRefusal
+from throwcollect.control import GoalResult, GoalStatus, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
-from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples, find_infinite_columns
+from throwcollect.episode.record import ControllerSamples, EpisodeHeader, GoalOutcome, Samples, find_infinite_columns
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.plan.conditions import Settings
@@ -162,7 +162,7 @@ class Simulator:
             state: Whether world and controllers go to the start state of the trial.
         """
         self._in_trial, self._sent = False, None
-        self.trial.forget_goals()
+        self._goals: dict[str, GoalOutcome] = {}
         number, config = self.trial.number, self.trial.config
         start_ns = self.now_ns
         if time:
@@ -185,7 +185,7 @@ class Simulator:
         refusal = limb.refuse_locked(goal.trajectory) or limb.controller.submit(goal_id, goal, self.now_ns)
         self._collect_results()
         if refusal is None:
-            self.trial.note_goal(controller)
+            self._goals[controller] = GoalOutcome(controller, GoalStatus.EXECUTING, 0, "")
         return refusal
 
     def step(self, steps: int) -> int:
@@ -229,7 +229,7 @@ class Simulator:
             start_ns=int(samples.stamps_ns[0]),
             end_reason=end_reason,
             contacts=self.world.contacts(),
-            goals=self.trial.outcomes(self.limbs),
+            goals=tuple(self._goals[name] for name in self.limbs if name in self._goals),
             samples=len(samples),
         )
         states = {}
@@ -302,4 +302,5 @@ class Simulator:
         for name, limb in self.limbs.items():
             for result in limb.controller.pop_results():
                 self._results.append((name, result))
-                self.trial.note_result(name, result)
+                if name in self._goals:
+                    self._goals[name] = GoalOutcome(name, result.status, result.error_code, result.error_string)

@@ -141,7 +141,6 @@ class World(Observer):
         with explain_failure("engines", self._name, "begin a trial"):
             self.engine.reset(self._settled)
         sim = trial.sim
-        self._base_height = trial.robot.base_height_m
         self.physics_hz = sim.physics_hz
         self._stride = sim.physics_hz // trial.record.rate_hz
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
@@ -261,11 +260,6 @@ class World(Observer):
     def posture(self) -> Mapping[str, float]:
         """Measure the position of each joint of the robot now [rad], as its sensor shows it."""
         return {**self._locked, **dict(zip(self.moving, self.joints()[0], strict=True))}
-
-    @property
-    def robot_base(self) -> BodyState:
-        """The base of the robot, which never moves."""
-        return BodyState((0.0, 0.0, self._base_height))
 
     @property
     def bodies(self) -> Mapping[str, BodyState]:
