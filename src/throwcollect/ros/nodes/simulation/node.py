@@ -140,10 +140,7 @@ class SimulationNode(Node):
         try:
             self._simulation.advance(watched=self.watched)
         except MemberError as error:
-            if (refusal := self._leases.fail(error)) is None:
-                raise
-            self._begin_next()
-            self._episodes.publish(pack(refusal, self._signer))
+            self._leases.fail(error)
 
     def follow_up(self) -> None:
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
@@ -157,9 +154,8 @@ class SimulationNode(Node):
         self._publish_samples()
         for controller in self._subscribed:
             controller.publish_state()
-        if (handed := self._leases.hand_over()) is not None:
-            # The next trial begins before the episode is sent, so that no client can reach a controller in between.
-            self._begin_next()
+        # The next trial begins before the episode is sent, so that no client can reach a controller in between.
+        for handed in self._leases.collect():
             self._episodes.publish(pack(handed, self._signer))
         self._stepping.follow_up()
         if self._recording is not None:
@@ -286,13 +282,8 @@ class SimulationNode(Node):
         """Begin the trials that a coordinator has asked for, and undo what clients have set."""
         if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
             return
-        self._leases.replace(self._requested)
         self._restore_parameters()
-        self._begin_next()
-
-    def _begin_next(self) -> None:
-        while (refusal := self._leases.begin_next()) is not None:
-            self._episodes.publish(pack(refusal, self._signer))
+        self._leases.replace(self._requested)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Set up the physics that the next reset prepares, unless the simulation is leased."""
