@@ -116,13 +116,10 @@ class Graph:
         """Names and ROS types of endpoints, sorted, of all nodes or of one, given by its namespace and name."""
         return group_types((token.name, token.topic_type) for token in self.tokens(*kinds, node=node))
 
-    def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
-        """Wait until a condition is true of the graph; return whether it is.
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Wait until a condition is true of the graph, for at most a time [s], and return whether it is.
 
-        Args:
-            condition: What to wait for.
-            timeout_s: Longest time [s]; None or negative for no limit.
-            alive: Whether waiting still makes sense.
+        None or a negative time is no limit.
         """
         deadline = deadline_after(timeout_s)
         while True:
@@ -131,7 +128,7 @@ class Graph:
                 return True
             # The thread waits for short times only, because nothing notifies it when the context is shut down.
             left = deadline - time.monotonic()
-            if left <= 0 or not alive():
+            if left <= 0 or self.session.is_closed():
                 return False
             with self._changed:
                 if self.changes == seen:

@@ -127,12 +127,8 @@ class Client(Endpoint, Receiver):
         return querier is not None and bool(querier.matching_status.matching)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until a node offers the service, for at most ``timeout_sec``; return whether one does.
-
-        None or a negative time is no limit.
-        """
-        context = self.node.context
-        return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
+        """Wait until a node offers the service, and return whether one does; see `Graph.wait_for`."""
+        return self.node.context.graph.wait_for(self.service_is_ready, timeout_sec)
 
     def call_async(self, request: Message, convert: Callable[[Any], Any] = lambda response: response) -> Future:
         """Send a request; the future of the response stays pending if no service answers.

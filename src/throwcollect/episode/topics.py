@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.scene import BALL
-from throwcollect.episode.frames import WORLD, Frame, MovingFrame
+from throwcollect.episode.frames import WORLD, Frame
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.errors import DatasetError
@@ -183,7 +183,7 @@ def _fill_clock(rows: Rows, samples: Samples, _: SetPoints) -> None:
     put_stamps(rows, "clock", samples.stamps_ns)
 
 
-def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str], bodies: Sequence[str] = (BALL,)) -> Topic:
+def transforms(frames: tuple[Frame, ...], joints: Sequence[str], bodies: Sequence[str] = (BALL,)) -> Topic:
     """``/tf``: tf2_msgs/TFMessage with object and moving bodies in world, and every frame that a joint moves."""
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]

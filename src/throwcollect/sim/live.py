@@ -257,10 +257,6 @@ class LiveSimulator(Simulator):
         first, self._published = self._published, self.world.recorded
         return self.world.samples(first)
 
-    def last_sample(self) -> Samples:
-        """Return the sample that was recorded last."""
-        return self.world.samples(self.world.recorded - 1)
-
     def observe(self, controller: str) -> JointTrajectoryController:
         """Return a controller after it has seen the present state of its joints, which its `state` and `query` need."""
         limb = self.limbs[controller]

@@ -143,7 +143,7 @@ def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then
         simulation.world.place("ball", BodyState((2.0, 0.0, 1.0)))
         assert simulation.submit(ARM, number, goal(ARM, duration_s)) is None
         run(simulation)
-        ball = simulation.world.object
+        ball = simulation.world.bodies["ball"]
         assert ball.position == pytest.approx((2.0, 0.0, config.ball.radius_m), abs=2e-3)
         assert np.hypot(*ball.linear_velocity[:2]) + abs(ball.linear_velocity[2]) < 0.01
     simulation.close()
@@ -152,7 +152,7 @@ def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then
 def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_trial(simulation: LiveSimulator) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     run(simulation)
-    rolling = simulation.world.object
+    rolling = simulation.world.bodies["ball"]
     assert rolling.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
     assert rolling.linear_velocity[0] > 1.0
     assert simulation.now_ns / 1e9 == pytest.approx(1.0 + CONFIG.sim.max_trial_s, abs=0.1)
@@ -219,7 +219,7 @@ def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: LiveSimulator)
     simulation.step(250)
     simulation.reset(state=False)
     before = simulation.world.joints()[0]
-    ball = simulation.world.object
+    ball = simulation.world.bodies["ball"]
     assert simulation.now_ns == 0
     assert simulation.world.recorded == 1
     assert simulation.world.samples().object_position[0].tolist() == list(ball.position)

@@ -179,7 +179,7 @@ class SimulationNode(Node):
         samples: Samples = self._simulation.fresh_samples()
         if not len(samples) and self._rests and time.monotonic() - self._published_at >= _REPEAT_S:
             # Robots go on to publish their state while they rest.
-            samples = self._simulation.last_sample()
+            samples = self._simulation.world.samples(self._simulation.world.recorded - 1)
         if len(samples):
             self._published_at = time.monotonic()
         columns = [(publisher, topic.encode(samples, {})) for topic, publisher in self._listened]
