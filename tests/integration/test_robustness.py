@@ -203,7 +203,7 @@ def test_a_goal_goes_on_when_its_client_vanishes_and_is_forgotten_in_time(
     assert robot.set({"sim.real_time_factor": 0.0}).successful
     # The clock of the simulation jumps by more than the time for which results are kept.
     wait_for_episodes(robot, lease(robot, {}, trial=3))
-    assert robot.outcome(robot.send(swing()))[1] == 0
+    assert robot.outcome(robot.send(goal(ARM, 2.0)))[1] == 0
     # On DDS, the result may overtake the status.
     robot.wait_until(lambda: last() == [4], "the status of the new goal alone")
     assert process.poll() is None
