@@ -25,7 +25,6 @@ from throwcollect.members import explain_failure
 from throwcollect.plan.conditions import Settings
 from throwcollect.plan.trials import NO_TARGET, Trial, Values
 from throwcollect.robots.description import full_description, robot_of, start_posture
-from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.policy import Policy, PolicyLoop, make_policy
@@ -211,7 +210,11 @@ class Simulator:
         conditions = self._settings.conditions_of(self._settings.read_values(config), motion.digest)
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the frames of bodies.
-        result = self._judge(config, motion, table.samples, header)
+        if (infinite := next(find_infinite_columns(table.samples), None)) is not None:
+            raise ThrowcollectError(f"trial {header.trial}: {infinite}")
+        # Writing finds results of a wrong kind. They are a fault of the task, too, so writing stands in this block.
+        with explain_failure("tasks", config.task.name, f"judge trial {header.trial}"):
+            result = self._columns.to_json(task_of(config).judge(table.samples, header, motion))
         # What sensors see follows from what is recorded, and is the same when it is rendered later.
         seen = self._sensors.record(config, header.trial, table.samples) if self._sensors else ()
         return Episode(header, state, sensors=seen, result=result, conditions=conditions)
@@ -244,14 +247,6 @@ class Simulator:
         """Return controllers and results of the goals that have ended since the last call, oldest first."""
         results, self._results = self._results, []
         return results
-
-    def _judge(self, config: Config, motion: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:
-        """Judge a trial; return its result in JSON."""
-        if (infinite := next(find_infinite_columns(samples), None)) is not None:
-            raise ThrowcollectError(f"trial {header.trial}: {infinite}")
-        # Writing finds results of a wrong kind. They are a fault of the task, too, so writing stands in this block.
-        with explain_failure("tasks", config.task.name, f"judge trial {header.trial}"):
-            return self._columns.to_json(task_of(config).judge(samples, header, motion))
 
     def _step_some(self, most: int) -> int:
         """Take at most `most` steps, so that a controller looks at the measured state when it has to."""

@@ -97,7 +97,6 @@ class SimulationNode(Node):
         self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
         self._manager = ControllerManager(self, simulation)
         self._listened: list[tuple[Topic, Publisher]] = []
-        self._subscribed: list[ControllerNode] = []
         self._published_at = 0.0
         self._published_ns = -1
         self._signer = Signer.of_environment()
@@ -133,7 +132,7 @@ class SimulationNode(Node):
     def watched(self) -> bool:
         """Whether samples, states or feedback have subscribers."""
         self._notice_listeners()
-        return bool(self._listened) or any(controller.watched for controller in self._subscribed)
+        return bool(self._listened) or any(controller.watched for controller in self._controllers.values())
 
     def advance(self) -> None:
         """Run for a stretch of time; a leased trial in which an engine of another package fails is refused."""
@@ -152,7 +151,7 @@ class SimulationNode(Node):
             self._controllers[name].action.finish(result)
         self._notice_listeners()
         self._publish_samples()
-        for controller in self._subscribed:
+        for controller in self._controllers.values():
             controller.publish_state()
         # The next trial begins before the episode is sent, so that no client can reach a controller in between.
         for handed in self._leases.collect():
@@ -210,8 +209,7 @@ class SimulationNode(Node):
     def _notice_listeners(self) -> None:
         """Find out which topics have subscribers."""
         self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
-        self._subscribed = [controller for controller in self._controllers.values() if controller.has_subscribers]
-        self._simulation.watch(controller.controller for controller in self._subscribed if controller.wants_states)
+        self._simulation.watch(name for name, controller in self._controllers.items() if controller.wants_states)
 
     def _publish_latched(self, channels: Channels) -> None:
         """Publish what stays; by a parameter, a client gives viewers another description to draw."""
