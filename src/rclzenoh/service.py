@@ -18,7 +18,7 @@ from rclzenoh.interfaces import Service as ServiceType
 from rclzenoh.keys import EntityKind
 from rclzenoh.mailbox import Receiver
 from rclzenoh.node_base import NodeBase
-from rclzenoh.qos import QoSProfile
+from rclzenoh.qos import QoSProfile, qos_profile_services_default
 from rclzenoh.task import Future, call
 
 _PATIENT_SERVICE = "/_action/get_result"
@@ -97,8 +97,8 @@ class Service(Endpoint, Receiver):
 class Client(Endpoint, Receiver):
     """Calls a service. Made by `Node.create_client`."""
 
-    def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, qos_profile: QoSProfile) -> None:
-        Endpoint.__init__(self, node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
+    def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str) -> None:
+        Endpoint.__init__(self, node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile_services_default)
         # There is at most one response per request, and a dropped one would be waited for in vain.
         Receiver.__init__(self, node.mailbox, None)
         self.service_name = self.name
