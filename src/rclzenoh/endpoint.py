@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import zenoh
 from xxhash import xxh3_64_hexdigest
+from zenoh.ext import AdvancedPublisher
 
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces import type_hash
@@ -72,7 +73,10 @@ class Endpoint:
         declared, self.declared = self.declared, None
         if declared is not None and not self.session.is_closed():
             self._declared_token.undeclare()
-            declared.undeclare()
+            # Undeclaring an advanced publisher may wait 10 s for its heartbeat (Zenoh 1.10). Dropping one withdraws it,
+            # too, which holds for nothing else that has a callback.
+            if not isinstance(declared, AdvancedPublisher):
+                declared.undeclare()
 
     def invalid(self, error: zenoh.ZError) -> InvalidHandle:
         """The error to raise when Zenoh refuses to send."""

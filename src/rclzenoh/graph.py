@@ -44,8 +44,6 @@ class Graph:
         self._changed = threading.Condition()
         # By kind and name, and then by key expression.
         self._tokens: dict[tuple[EntityKind, str], dict[str, Token]] = {}
-        # By namespace and name of the node, and then by key expression.
-        self._of_nodes: dict[tuple[str, str], dict[str, Token]] = {}
         self.changes = 0
         """Number of changes so far; as long as it stays the same, what is known of the graph does, too."""
 
@@ -80,8 +78,11 @@ class Graph:
             if token is not None:
                 # A token may be announced more than once: after a lost connection to the router, or because two
                 # subscribers follow it, that of its kind and that of a part.
-                _note(self._tokens, (token.kind, token.name), key, token if appeared else None)
-                _note(self._of_nodes, (token.node_namespace, token.node_name), key, token if appeared else None)
+                same_name = self._tokens.setdefault((token.kind, token.name), {})
+                if appeared:
+                    same_name[key] = token
+                else:
+                    same_name.pop(key, None)
         self.note_change()
 
     def note_change(self, _status: object = None) -> None:
@@ -97,13 +98,12 @@ class Graph:
         for kind in kinds:
             self._follow(kind, node and node[0], name)
         # What is iterated over is copied, because threads of Zenoh may change it meanwhile.
-        if node is not None:
-            found = [self._of_nodes.get(node, {})]
-        elif name is not None:
+        if name is not None:
             found = [self._tokens.get((kind, name), {}) for kind in kinds]
         else:
             found = [same_name for (kind, _), same_name in list(self._tokens.items()) if kind in kinds]
-        return (token for same_place in found for token in list(same_place.values()) if token.kind in kinds)
+        tokens = (token for same_name in found for token in list(same_name.values()))
+        return (token for token in tokens if node in (None, (token.node_namespace, token.node_name)))
 
     def count(self, kind: EntityKind, name: str, dds_type: str | None = None) -> int:
         """Endpoints of one kind, name and, if given, DDS type."""
@@ -116,13 +116,10 @@ class Graph:
         """Names and ROS types of endpoints, sorted, of all nodes or of one, given by its namespace and name."""
         return group_types((token.name, token.topic_type) for token in self.tokens(*kinds, node=node))
 
-    def wait_for(self, condition: Callable[[], bool], timeout_s: float | None, alive: Callable[[], bool]) -> bool:
-        """Wait until a condition is true of the graph; return whether it is.
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float | None) -> bool:
+        """Wait until a condition is true of the graph, for at most a time [s], and return whether it is.
 
-        Args:
-            condition: What to wait for.
-            timeout_s: Longest time [s]; None or negative for no limit.
-            alive: Whether waiting still makes sense.
+        None or a negative time is no limit.
         """
         deadline = deadline_after(timeout_s)
         while True:
@@ -131,21 +128,11 @@ class Graph:
                 return True
             # The thread waits for short times only, because nothing notifies it when the context is shut down.
             left = deadline - time.monotonic()
-            if left <= 0 or not alive():
+            if left <= 0 or self.session.is_closed():
                 return False
             with self._changed:
                 if self.changes == seen:
                     self._changed.wait(min(left, _POLL_S))
-
-
-def _note(tokens: dict[Any, dict[str, Token]], place: tuple[Any, str], key: str, token: Token | None) -> None:
-    """Note that a token has appeared, or is gone, in a table of tokens by place."""
-    if token is not None:
-        tokens.setdefault(place, {})[key] = token
-    elif place in tokens:
-        tokens[place].pop(key, None)
-        if not tokens[place]:
-            del tokens[place]
 
 
 def group_types(pairs: Iterable[tuple[str, str]]) -> list[tuple[str, list[str]]]:

@@ -14,11 +14,9 @@ from rclzenoh.time import S_TO_NS, Time
 class LoggingSeverity(IntEnum):
     """How severe a message is; the values are those of rcl_interfaces/msg/Log."""
 
-    DEBUG = 10
     INFO = 20
     WARN = 30
     ERROR = 40
-    FATAL = 50
 
 
 class Logger:

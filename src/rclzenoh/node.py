@@ -109,15 +109,9 @@ class Node(NodeBase, NodeParameters):
         """
         return self._keep(Service(self, srv_type, srv_name, callback, qos_profile))
 
-    def create_client(
-        self,
-        srv_type: type[ServiceType],
-        srv_name: str,
-        *,
-        qos_profile: QoSProfile = qos_profile_services_default,
-    ) -> Client:
+    def create_client(self, srv_type: type[ServiceType], srv_name: str) -> Client:
         """Make a client of a service."""
-        return self._keep(Client(self, srv_type, srv_name, qos_profile))
+        return self._keep(Client(self, srv_type, srv_name))
 
     def create_timer(self, timer_period_sec: float, callback: Callable[[], Any]) -> Timer:
         """Make a timer, which runs in real time; the callback may be a coroutine function."""

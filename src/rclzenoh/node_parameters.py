@@ -15,8 +15,6 @@ from rclzenoh.exceptions import (
 )
 from rclzenoh.interfaces import AnyMessage, Service
 from rclzenoh.interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
     ListParametersResult,
     ParameterDescriptor,
     ParameterEvent,
@@ -35,7 +33,7 @@ from rclzenoh.interfaces.srv import (
 from rclzenoh.parameter import Parameter, ParameterKind
 
 _RELATIVE_TOLERANCE = 1e-6
-"""A value this close to a bound or a step of its range counts as equal to it; rclpy has the same tolerance."""
+"""A value this close to a bound of its range counts as equal to it; rclpy has the same tolerance."""
 
 
 class NodeParameters:
@@ -205,32 +203,13 @@ def find_refusal(parameter: Parameter, descriptor: ParameterDescriptor, *, is_de
         if parameter.type_ is not ParameterKind.NOT_SET and parameter.type_.value != descriptor.type:
             expected = ParameterKind(descriptor.type).name
             return f"Wrong parameter type of {parameter.name}, expected {expected}, got {parameter.type_.name}"
-    if parameter.type_ is ParameterKind.INTEGER and len(descriptor.integer_range):
-        return _check_integer(parameter, descriptor.integer_range[0])
-    if parameter.type_ is ParameterKind.DOUBLE and len(descriptor.floating_point_range):
-        return _check_double(parameter, descriptor.floating_point_range[0])
-    return None
-
-
-def _check_integer(parameter: Parameter, allowed: IntegerRange) -> str | None:
-    low, high = sorted((allowed.from_value, allowed.to_value))
-    value = parameter.value
-    if not low <= value <= high:
-        return f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}"
-    if value not in (low, high) and allowed.step and (value - low) % allowed.step:
-        return f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}"
-    return None
-
-
-def _check_double(parameter: Parameter, allowed: FloatingPointRange) -> str | None:
-    low, high = sorted((allowed.from_value, allowed.to_value))
-    value = parameter.value
-    if any(math.isclose(value, bound, rel_tol=_RELATIVE_TOLERANCE) for bound in (low, high)):
-        return None
-    if not low < value < high:
-        return f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}"
-    if allowed.step:
-        nearest = low + round((value - low) / allowed.step) * allowed.step
-        if not math.isclose(nearest, value, rel_tol=_RELATIVE_TOLERANCE):
-            return f"{value} of parameter {parameter.name} is no step of {allowed.step} from {low}"
+    ranges: dict[ParameterKind, Sequence[Any]] = {
+        ParameterKind.INTEGER: descriptor.integer_range,
+        ParameterKind.DOUBLE: descriptor.floating_point_range,
+    }
+    for span in ranges.get(parameter.type_, ()):
+        low, high = sorted((span.from_value, span.to_value))
+        near = any(math.isclose(parameter.value, bound, rel_tol=_RELATIVE_TOLERANCE) for bound in (low, high))
+        if not (low <= parameter.value <= high or (near and parameter.type_ is ParameterKind.DOUBLE)):
+            return f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {parameter.value}"
     return None

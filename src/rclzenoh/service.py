@@ -18,7 +18,7 @@ from rclzenoh.interfaces import Service as ServiceType
 from rclzenoh.keys import EntityKind
 from rclzenoh.mailbox import Receiver
 from rclzenoh.node_base import NodeBase
-from rclzenoh.qos import QoSProfile
+from rclzenoh.qos import QoSProfile, qos_profile_services_default
 from rclzenoh.task import Future, call
 
 _PATIENT_SERVICE = "/_action/get_result"
@@ -97,8 +97,8 @@ class Service(Endpoint, Receiver):
 class Client(Endpoint, Receiver):
     """Calls a service. Made by `Node.create_client`."""
 
-    def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str, qos_profile: QoSProfile) -> None:
-        Endpoint.__init__(self, node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile)
+    def __init__(self, node: NodeBase, srv_type: type[ServiceType], srv_name: str) -> None:
+        Endpoint.__init__(self, node, EntityKind.CLIENT, srv_name, srv_type.TYPE, qos_profile_services_default)
         # There is at most one response per request, and a dropped one would be waited for in vain.
         Receiver.__init__(self, node.mailbox, None)
         self.service_name = self.name
@@ -127,12 +127,8 @@ class Client(Endpoint, Receiver):
         return querier is not None and bool(querier.matching_status.matching)
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until a node offers the service, for at most ``timeout_sec``; return whether one does.
-
-        None or a negative time is no limit.
-        """
-        context = self.node.context
-        return context.graph.wait_for(self.service_is_ready, timeout_sec, context.ok)
+        """Wait until a node offers the service, and return whether one does; see `Graph.wait_for`."""
+        return self.node.context.graph.wait_for(self.service_is_ready, timeout_sec)
 
     def call_async(self, request: Message, convert: Callable[[Any], Any] = lambda response: response) -> Future:
         """Send a request; the future of the response stays pending if no service answers.

@@ -19,11 +19,8 @@ from rclzenoh.exceptions import ConfigurationError
 
 DOMAIN_VARIABLE = "ROS_DOMAIN_ID"
 _LARGEST_DOMAIN = 232
-
-
 DEFAULT_ENDPOINT = "tcp/localhost:7447"
 """Where the router of a host listens."""
-
 CONFIG_FILE_VARIABLE = "ZENOH_SESSION_CONFIG_URI"
 OVERRIDE_VARIABLE = "ZENOH_CONFIG_OVERRIDE"
 OPEN = "tcp/"

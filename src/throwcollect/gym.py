@@ -180,7 +180,7 @@ class ThrowEnv(gymnasium.Env[Any, NDArray[np.float64]]):
             raise PlanError([Problem(reason)], hint="a collection would leave this trial out, as refused")
         self._checked = values
         self._simulator.begin(0, values, seed=int(self.np_random.integers(2**63)), target=target)
-        trial = self._simulator.trial.begun.config
+        trial = self._simulator.trial.config
         self._target, self._ended = target, False
         self._gravity = trial.scene.gravity_mps2
         self._plane_m = trial.scene.landing_height_m + object_of(trial).radius_m

@@ -10,7 +10,8 @@ from zenoh.ext import declare_advanced_subscriber
 
 from rclzenoh.endpoint import unpack as unpack_attachment
 from rclzenoh.interfaces import type_hash
-from tests.integration.robot import ALL, ARM, CONFIG, Robot, goal, signer, swing
+from tests.integration.robot import ALL, CONFIG, Robot, signer
+from tests.integration.test_leases import ask_for, lease
 from throwcollect.episode.episode_message import unpack
 from throwcollect.ros import get_message
 from throwcollect.ros.middleware import Middleware
@@ -40,13 +41,8 @@ def test_a_genuine_subscriber_misses_no_episode(endpoint: str, robot: Robot) -> 
     ours: list[bytes] = []
     subscription = robot.node.create_subscription(get_message(KIND), robot.topic("episode"), ours.append, ALL, raw=True)
     with genuine_subscriber(endpoint, key) as samples:
-        for number in range(TRIALS):
-            assert robot.set({"trial.number": number, "trial.controllers": [ARM]}).successful
-            robot.reset()
-            # Every third trial ends late, as the arm stands still and the ball stays in the spoon.
-            robot.send(goal(ARM, 0.2) if number % 3 == 2 else swing(1.0))
-            robot.wait_until(lambda number=number: len(samples) > number, f"episode {number}")
-        robot.wait_until(lambda: len(ours) == TRIALS, "all episodes")
+        assert ask_for(robot, *(lease(robot, {}, trial=number) for number in range(TRIALS))).successful
+        robot.wait_until(lambda: len(samples) == len(ours) == TRIALS, "all episodes")
     robot.node.destroy_subscription(subscription)
     heard = [sample.payload.to_bytes() for sample in samples]
     assert heard == ours

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, TORSO, Robot, goal, signer, swing, trajectory
-from throwcollect.episode.episode_message import Episode, unpack
+from tests.integration.robot import ARM, CONFIG, ELBOW, HEAD, PAUSED, STEP_NS, Robot, goal, signer, swing, trajectory
+from throwcollect.episode.episode_message import unpack
 from throwcollect.plan.lease import Lease, leases_to_json
 from throwcollect.ros import DurabilityPolicy, QoSProfile, get_message
 from throwcollect.run_key import Signer
@@ -29,17 +29,6 @@ def ask_for(robot: Robot, *leases: Lease) -> Any:
     return robot.set({"trial.leases": leases_to_json(leases)})
 
 
-def by_hand(robot: Robot) -> Episode:
-    """The episode of a trial that was set up by parameters."""
-    with robot.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
-        assert robot.send(swing()).accepted
-        assert robot.send(goal(TORSO), TORSO).accepted
-        robot.wait_until(lambda: bool(heard), "an episode")
-    delivery = unpack(heard[0], signer())
-    assert isinstance(delivery, Episode)
-    return delivery
-
-
 SLOWLY = {"sim.real_time_factor": 1.0}
 
 
@@ -49,7 +38,7 @@ def leased(robot: Robot) -> Iterator[Robot]:
     assert robot.set(SLOWLY).successful
     assert ask_for(robot, lease(robot, {"ball.mass_kg": 0.05})).successful
     yield robot
-    robot.set({"trial.number": -1})
+    assert ask_for(robot).successful
     robot.set({"sim.real_time_factor": 0.0})
 
 
@@ -74,6 +63,19 @@ def test_leased_trials_are_simulated_and_judged_in_their_order(robot: Robot) -> 
     assert start_ns == [CONFIG.trial_start_ns(trial) for trial in (4, 2, 3)]
 
 
+def test_steps_of_a_paused_simulation_go_on_beyond_the_end_of_a_trial(robot: Robot) -> None:
+    robot.put_into(PAUSED)
+
+    def step() -> None:
+        start_ns = robot.now_ns()
+        assert start_ns == CONFIG.trial_start_ns(4)
+        assert robot.step(2000).result == Result.RESULT_OK
+        assert robot.now_ns() - start_ns == 2000 * STEP_NS
+
+    (delivery,) = wait_for_episodes(robot, lease(robot, {}), meanwhile=step)
+    assert delivery.header.trial == 4
+
+
 def test_leases_that_are_not_signed_are_refused(robot: Robot) -> None:
     for wrong in (lease(robot, {}, by=Signer(b"another key")), replace(lease(robot, {}), simulation="/sim_9")):
         result = ask_for(robot, wrong)
@@ -90,25 +92,15 @@ def test_leases_cannot_be_set_together_with_other_parameters(robot: Robot) -> No
 
 
 def test_a_leased_trial_ignores_parameters_that_were_set_by_hand(robot: Robot) -> None:
-    by_hand = {"trial.number": 7, "trial.controllers": [ARM], "ball.friction": 0.1, "scene.gravity_mps2": 1.6}
+    by_hand = {"ball.friction": 0.1, "scene.gravity_mps2": 1.6}
     assert robot.set(by_hand).successful
     assert robot.set({"constraints.goal_time": 0.1, "cmd_timeout": 0.2}, node=ARM).successful
     (delivery,) = wait_for_episodes(robot, lease(robot, {"ball.mass_kg": 0.05}))
     assert '{"ball.mass_kg": 0.05}' in delivery.conditions.split("\n")
-    number, controllers, *physics = robot.parameters("get_parameters", names=list(by_hand)).values
-    assert (number.integer_value, list(controllers.string_array_value)) == (-1, [""])
+    physics = robot.parameters("get_parameters", names=list(by_hand)).values
     assert [value.double_value for value in physics] == [CONFIG.ball.friction, CONFIG.scene.gravity_mps2]
     limits = robot.parameters("get_parameters", node=ARM, names=["constraints.goal_time", "cmd_timeout"]).values
     assert [value.double_value for value in limits] == [0.6, 0.0]
-
-
-def test_a_reset_after_a_lease_begins_the_trial_of_the_parameters(robot: Robot) -> None:
-    wait_for_episodes(robot, lease(robot, {"ball.mass_kg": 0.05}))
-    robot.reset()
-    assert robot.now_ns() == 0
-    assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO]}).successful
-    robot.reset()
-    assert by_hand(robot).conditions.split("\n")[2] == "{}"
 
 
 @pytest.mark.parametrize(("factor", "accepted"), [(0.0, True), (1.0, True), (5.0, True), (0.99, False), (0.001, False)])
@@ -129,11 +121,8 @@ def test_slow_motion_ends_when_a_trial_is_leased(robot: Robot) -> None:
     assert value.double_value == 0.0
 
 
-@pytest.mark.parametrize(
-    "values", [{"ball.friction": 0.1}, {"trial.number": 5}, {"trial.number": -1, "ball.friction": 0.1}]
-)
-def test_parameters_of_a_leased_trial_cannot_be_set(values: dict[str, Any], leased: Robot) -> None:
-    result = leased.set(values)
+def test_parameters_of_a_leased_trial_cannot_be_set(leased: Robot) -> None:
+    result = leased.set({"ball.friction": 0.1})
     assert not result.successful
     assert LEASED in result.reason
 
@@ -179,11 +168,3 @@ def test_controllers_are_as_configured_in_every_leased_trial(robot: Robot) -> No
     robot.publish(f"{ARM}/speed_scaling_input", SpeedScalingFactor(factor=0.5), LATCHED)
     (touched,) = wait_for_episodes(robot, lease(robot, {}))
     assert touched.digest == untouched.digest
-
-
-def test_an_episode_without_a_lease_has_no_trajectory_in_its_conditions(robot: Robot) -> None:
-    assert robot.set({"trial.number": 4, "trial.controllers": [ARM, TORSO], "ball.mass_kg": 0.05}).successful
-    robot.reset()
-    delivery = by_hand(robot)
-    assert delivery.conditions.split("\n")[2:] == ['{"ball.mass_kg": 0.05}', ""]
-    assert delivery.result == ""

@@ -5,16 +5,14 @@ from typing import Any
 
 import pytest
 
-from rclzenoh.interfaces import deserialize, message_class
-from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, TORSO, Robot, goal, signer, swing
+from tests.integration.robot import ARM, CONFIG, ELBOW, PAUSED, POSTURE, STEP_NS, Robot, goal, swing
 from throwcollect.config.key import Effect
 from throwcollect.config.values import sweepable_keys
-from throwcollect.episode.episode_message import unpack
 
-OWN = ["trial.number", "trial.controllers", "trial.leases", "sim.real_time_factor"]
+OWN = ["trial.leases", "sim.real_time_factor"]
 FOREIGN = ("use_sim_time", "start_type_description_service")
 """Parameters that every node of ROS has."""
-INTEGER, DOUBLE, STRING, STRINGS = 2, 3, 4, 9
+DOUBLE, STRING = 3, 4
 
 
 def test_trial_clock_and_swept_physics_are_parameters(robot: Robot) -> None:
@@ -27,12 +25,9 @@ def test_trial_clock_and_swept_physics_are_parameters(robot: Robot) -> None:
 def test_parameters_have_types_and_the_values_of_the_configuration(robot: Robot) -> None:
     names = [*OWN, "ball.mass_kg"]
     described = robot.parameters("describe_parameters", names=names).descriptors
-    assert [(each.name, each.type) for each in described] == list(
-        zip(names, [INTEGER, STRINGS, STRING, DOUBLE, DOUBLE], strict=True)
-    )
-    values = robot.parameters("get_parameters", names=["trial.number", "ball.mass_kg"]).values
-    assert values[0].integer_value == -1
-    assert values[1].double_value == CONFIG.ball.mass_kg
+    assert [(each.name, each.type) for each in described] == list(zip(names, [STRING, DOUBLE, DOUBLE], strict=True))
+    (mass,) = robot.parameters("get_parameters", names=["ball.mass_kg"]).values
+    assert mass.double_value == CONFIG.ball.mass_kg
 
 
 def range_of(descriptor: Any) -> tuple[float, float] | None:
@@ -55,7 +50,6 @@ def test_descriptions_of_parameters_come_from_the_configuration(robot: Robot) ->
     spans = {
         "ball.mass_kg": (0.0, 2.0),
         "task.start.arm_right_4_joint": (-6.3, 6.3),
-        "trial.number": (-1, 9_999_999),
         "sim.real_time_factor": (0.0, 1000.0),
         "sim.physics_hz": (100, 10000),
         "record.trials_per_shard": (1, 2**63 - 1),
@@ -81,8 +75,6 @@ def test_nodes_of_a_simulation_take_no_time_from_others(robot: Robot, node: str 
     [
         ({"ball.mass_kg": 1}, "Wrong parameter type.*expected.*DOUBLE.*got.*INTEGER"),
         ({"ball.mass_kg": 0.0}, r"ball\.mass_kg: should be greater than 0, got 0\.0"),
-        ({"trial.controllers": [ARM, "arm_controller"]}, "no controller 'arm_controller'"),
-        ({"trial.number": 10**15}, "trial.number"),
     ],
 )
 def test_a_wrong_value_is_refused_with_the_reason(values: dict[str, Any], reason: str, robot: Robot) -> None:
@@ -99,27 +91,6 @@ def test_physics_takes_effect_with_the_next_reset(robot: Robot) -> None:
     assert robot.joint(ELBOW) == pytest.approx(-1.7, abs=1e-4)
 
 
-def test_a_trial_waits_for_all_its_controllers_and_then_hands_in_its_episode(robot: Robot) -> None:
-    assert robot.set({"trial.number": 5, "trial.controllers": [ARM, TORSO], "ball.mass_kg": 0.05}).successful
-    robot.reset()
-    start_ns = CONFIG.trial_start_ns(5)
-    assert robot.now_ns() == start_ns
-    with robot.listening("std_msgs/msg/UInt8MultiArray", "episode", raw=True) as heard:
-        first = robot.send(swing())
-        assert robot.now_ns() == start_ns
-        second = robot.send(goal(TORSO), TORSO)
-        robot.wait_until(lambda: bool(heard), "an episode")
-    assert [robot.outcome(handle)[1] for handle in (first, second)] == [0, 0]
-    (message,) = heard
-    parts = [each.label for each in deserialize(message, message_class("std_msgs/msg/UInt8MultiArray")).layout.dim]
-    assert parts == ["header", "result", "conditions", "hash", "chunk", "signature"]
-    episode = unpack(message, signer())
-    episode.chunk.check_records()
-    header = episode.header
-    assert (header.trial, header.start_ns, header.end_reason) == (5, start_ns, "landed")
-    assert [(each.controller, each.status) for each in header.goals] == [(ARM, 4), (TORSO, 4)]
-
-
 def test_a_real_time_factor_can_be_set_and_taken_back(robot: Robot) -> None:
     assert robot.set({"sim.real_time_factor": 5.0}).successful
     assert robot.outcome(robot.send(swing(0.3)))[1] == 0
@@ -129,7 +100,7 @@ def test_a_real_time_factor_can_be_set_and_taken_back(robot: Robot) -> None:
 def test_setting_parameters_does_not_move_the_clock(robot: Robot) -> None:
     robot.put_into(PAUSED)
     robot.step(3)
-    assert robot.set({"trial.number": 2}).successful
+    assert robot.set({"ball.mass_kg": 0.05}).successful
     assert robot.now_ns() == 3 * STEP_NS
 
 

@@ -16,6 +16,7 @@ from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.keys import EntityKind, Token, data_key
 from tests.commands import Command
 from tests.integration.robot import ARM, OWN, PLAYING, Robot, environment, goal, swing
+from tests.integration.test_leases import lease, wait_for_episodes
 from throwcollect.ros import get_message
 from throwcollect.ros.middleware import uses_rclpy
 
@@ -168,8 +169,8 @@ def ask(session: Any, key: str, payload: bytes, attachment: bytes | None, unansw
 
 
 def assert_works(robot: Robot) -> None:
-    """A trial as a coordinator has it, from the parameters to the result."""
-    assert robot.set({"sim.real_time_factor": 0.0, "trial.controllers": [""]}).successful
+    """A motion as a client has it, from the parameters to the result."""
+    assert robot.set({"sim.real_time_factor": 0.0}).successful
     if robot.state() != PLAYING:
         robot.put_into(PLAYING)
     robot.reset()
@@ -199,10 +200,10 @@ def test_a_goal_goes_on_when_its_client_vanishes_and_is_forgotten_in_time(
         return [each.status for each in statuses[-1].status_list] if statuses else []
 
     robot.wait_until(lambda: last() == [4], "the goal of nobody is reached")
-    assert robot.set({"sim.real_time_factor": 0.0, "trial.number": 3}).successful
+    assert robot.set({"sim.real_time_factor": 0.0}).successful
     # The clock of the simulation jumps by more than the time for which results are kept.
-    robot.reset()
-    assert robot.outcome(robot.send(swing(0.2)))[1] == 0
+    wait_for_episodes(robot, lease(robot, {}, trial=3))
+    assert robot.outcome(robot.send(goal(ARM, 2.0)))[1] == 0
     # On DDS, the result may overtake the status.
     robot.wait_until(lambda: last() == [4], "the status of the new goal alone")
     assert process.poll() is None

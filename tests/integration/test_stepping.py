@@ -113,15 +113,3 @@ def test_other_step_requests_are_refused_while_steps_are_taken(robot: Robot, act
     assert words.endswith(f" of {FOR_EVER} steps")
     assert int(words.split()[2]) * STEP_NS == robot.now_ns()
     assert robot.step(1).result == Result.RESULT_OK
-
-
-def test_steps_go_on_beyond_the_end_of_a_trial_which_yields_its_episode(robot: Robot) -> None:
-    assert robot.set({"trial.number": 3, "trial.controllers": [ARM]}).successful
-    robot.reset()
-    start = robot.now_ns()
-    robot.put_into(PAUSED)
-    with robot.listening("std_msgs/msg/UInt8MultiArray", "episode") as episodes:
-        assert robot.send(goal(ARM, 1.0, arm_right_4_joint=-0.5, arm_right_7_joint=0.5)).accepted
-        assert robot.step(2000).result == Result.RESULT_OK
-        robot.wait_until(lambda: bool(episodes), "the episode")
-    assert robot.now_ns() - start == 2000 * STEP_NS

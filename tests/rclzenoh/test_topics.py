@@ -108,7 +108,7 @@ def test_a_discovered_subscriber_gets_the_next_message(rig):
         publisher, heard = talker.create_publisher(String, f"t{number}", 10), []
         thread = threading.Thread(target=listener.create_subscription, args=(String, f"t{number}", heard.append, 10))
         thread.start()
-        assert seen.wait_for(publisher.get_subscription_count, 10, talker.context.ok)
+        assert seen.wait_for(publisher.get_subscription_count, 10)
         publisher.publish(String(data="first"))
         thread.join()
         assert rig.spin(lambda heard=heard: heard), f"the first message of {publisher.topic_name} is lost"

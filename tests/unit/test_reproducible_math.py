@@ -15,7 +15,7 @@ from tests import processors
 from tests.unit.plan.own_plan import make_plan
 
 from throwcollect.config.loader import load
-from throwcollect.episode.frames import MovingFrame
+from throwcollect.episode.frames import Frame
 from throwcollect.reproducible_math import add_up, cos, exp, matmul, power, sin, solve
 from throwcollect.robots.trajectory import sample_quintic
 from throwcollect.tasks.task import task_of
@@ -48,7 +48,7 @@ def compute() -> Iterator[str]:
             sent = (trajectory.times, trajectory.positions, trajectory.velocities, trajectory.accelerations)
             yield show("sent", *sent)
             yield show("desired", *sample_quintic(trajectory, np.linspace(0, 2, 500)))
-    frame = MovingFrame("a", "b", (0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), "j", (0.36, 0.48, 0.8))
+    frame = Frame("a", "b", (0.0, 0.0, 0.0), (0.0, 0.6, 0.0, 0.8), "j", (0.36, 0.48, 0.8))
     yield show("frame", frame.rotation_at(np.linspace(-7, 7, 5000)))
 
 

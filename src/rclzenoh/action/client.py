@@ -60,12 +60,8 @@ class ActionClient:
         return all(client.service_is_ready() for client in self._clients)
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until a node offers the action, for at most ``timeout_sec``; return whether one does.
-
-        None or a negative time is no limit.
-        """
-        context = self._node.context
-        return context.graph.wait_for(self.server_is_ready, timeout_sec, context.ok)
+        """Wait until a node offers the action, and return whether one does; see `Graph.wait_for`."""
+        return self._node.context.graph.wait_for(self.server_is_ready, timeout_sec)
 
     def send_goal_async(self, goal: Message, feedback_callback: Callable[[Any], Any] | None = None) -> Future:
         """Send a goal; the future has a `ClientGoalHandle` once the goal is accepted or rejected.

@@ -79,7 +79,7 @@ class ServerGoalHandle(TrackedGoal):
 class ActionServer:
     """Carries out goals.
 
-    All callbacks may be coroutine functions; other callbacks are called while they wait.
+    The execute callback may be a coroutine function; other callbacks are called while it waits.
 
     Args:
         node: Node that the server belongs to.
@@ -141,7 +141,9 @@ class ActionServer:
     async def carry_out(self, handle: ServerGoalHandle) -> None:
         """Call the execute callback of a goal, and answer those who wait for its result."""
         try:
-            result = await _await_outcome(self._execute_callback(handle))
+            result = self._execute_callback(handle)
+            if hasattr(result, "__await__"):
+                result = await result
         except GeneratorExit:
             raise  # The executor has ended, so no result can be sent any more.
         except BaseException:
@@ -166,15 +168,11 @@ class ActionServer:
                 self.change(handle, goals.EXECUTING)
             handle.abort()
 
-    async def _on_goal(self, request: AnyMessage, response: AnyMessage) -> Message:
+    def _on_goal(self, request: AnyMessage, response: AnyMessage) -> Message:
         now = self.node.get_clock().now()
         self._goals.expire(now.nanoseconds)
         key = key_of(request.goal_id)
-        answer = None
-        if key not in self._goals:
-            answer = await _await_outcome(self._goal_callback(request.goal))
-        # While the callback was waiting, another goal with the same identifier may have been accepted.
-        response.accepted = answer is GoalResponse.ACCEPT and key not in self._goals
+        response.accepted = key not in self._goals and self._goal_callback(request.goal) is GoalResponse.ACCEPT
         if response.accepted:
             response.stamp = now.to_msg()
             info = GoalInfo(goal_id=request.goal_id, stamp=response.stamp)
@@ -183,18 +181,16 @@ class ActionServer:
             submit(self.node.mailbox, partial(self._begin, self._goals[key]))
         return response
 
-    async def _begin(self, handle: ServerGoalHandle) -> None:
+    def _begin(self, handle: ServerGoalHandle) -> None:
         self._publish_status()
-        await _await_outcome(self._handle_accepted_callback(handle))
+        self._handle_accepted_callback(handle)
 
-    async def _on_cancel(self, request: CancelGoal.Request, response: CancelGoal.Response) -> Message:
+    def _on_cancel(self, request: CancelGoal.Request, response: CancelGoal.Response) -> Message:
         self._goals.expire(self._read_clock_ns())
         response.return_code, handles = self._goals.select(request.goal_info)
         canceling = []
         for handle in handles:
-            answer = await _await_outcome(self._cancel_callback(handle))
-            # The goal may have ended while the callback was waiting.
-            if answer is CancelResponse.ACCEPT and handle.can_become(goals.CANCELING):
+            if self._cancel_callback(handle) is CancelResponse.ACCEPT:
                 handle.become(goals.CANCELING, self._read_clock_ns())
                 canceling.append(handle.info)
         if canceling:
@@ -220,8 +216,3 @@ class ActionServer:
 
     def _read_clock_ns(self) -> int:
         return self.node.get_clock().now().nanoseconds
-
-
-async def _await_outcome(value: Any) -> Any:
-    """Return the value of a callback; if the callback is a coroutine function, wait for it."""
-    return await value if hasattr(value, "__await__") else value

@@ -28,20 +28,17 @@ class Frame:
         child: Name of the frame itself.
         translation: Origin of the frame in its parent [m].
         rotation_xyzw: Unit quaternion, frame to parent.
+        joint: Name of the joint that moves the frame; empty if it never moves.
+        axis: Unit vector in the frame, about which the joint turns it.
+        slides: Whether the joint moves the frame along the axis instead.
     """
 
     parent: str
     child: str
     translation: tuple[float, float, float]
     rotation_xyzw: tuple[float, float, float, float]
-
-
-@dataclass(frozen=True)
-class MovingFrame(Frame):
-    """A frame that a joint turns about an axis or, if it `slides`, moves along it: a unit vector in the frame."""
-
-    joint: str
-    axis: tuple[float, float, float]
+    joint: str = ""
+    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
     slides: bool = False
 
     def translation_at(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -81,7 +78,7 @@ class FrameTree:
     """
 
     fixed: tuple[Frame, ...]
-    moving: tuple[MovingFrame, ...]
+    moving: tuple[Frame, ...]
     links: tuple[str, ...]
 
 
@@ -95,8 +92,8 @@ def read_frames(urdf: str, *, base_height: float) -> FrameTree:
     frames = [_frame_of(joint) for joint in model.joints]
     root = Frame(WORLD, model.links[0].name, (0.0, 0.0, base_height), (0.0, 0.0, 0.0, 1.0))
     return FrameTree(
-        fixed=(root, *(frame for frame in frames if not isinstance(frame, MovingFrame))),
-        moving=tuple(frame for frame in frames if isinstance(frame, MovingFrame)),
+        fixed=(root, *(frame for frame in frames if not frame.joint)),
+        moving=tuple(frame for frame in frames if frame.joint),
         links=tuple(link.name for link in model.links),
     )
 
@@ -113,6 +110,4 @@ def _frame_of(joint: BodyJoint) -> Frame:
     x, y, z = joint.axis
     length = math.hypot(x, y, z)
     axis = x / length, y / length, z / length
-    return MovingFrame(
-        joint.parent, joint.child, translation, rotation, joint.name, axis, slides=joint.kind == "prismatic"
-    )
+    return Frame(joint.parent, joint.child, translation, rotation, joint.name, axis, joint.kind == "prismatic")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rclzenoh.interfaces import deserialize, get_message
 from throwcollect.config.scene import BALL
-from throwcollect.episode.frames import WORLD, Frame, MovingFrame
+from throwcollect.episode.frames import WORLD, Frame
 from throwcollect.episode.message_layout import MessageLayout
 from throwcollect.episode.record import ControllerSamples, Samples
 from throwcollect.errors import DatasetError
@@ -116,10 +116,7 @@ def joint_states(joints: tuple[str, ...]) -> Topic:
 
 def read_joint_names(message: bytes) -> tuple[str, ...]:
     """Read the names of the joints in a message of `joint_states`, in the order of its numbers."""
-    try:
-        joints = tuple(deserialize(message, get_message(_JOINT_STATE)).name)
-    except ValueError as error:
-        raise DatasetError(f"chunk: {error}") from error
+    joints = tuple(_read_message(message, _JOINT_STATE).name)
     if not joints:
         raise DatasetError("chunk: joint states that name no joint")
     return joints
@@ -158,8 +155,12 @@ def read_body_name(message: bytes) -> str:
     # Most bodies are balls, and comparing bytes is faster than reading the message.
     if odometry(BALL).layout.describes_message(message):
         return BALL
+    return str(_read_message(message, _ODOMETRY).child_frame_id)
+
+
+def _read_message(message: bytes, kind: str) -> Any:
     try:
-        return str(deserialize(message, get_message(_ODOMETRY)).child_frame_id)
+        return deserialize(message, get_message(kind))
     except ValueError as error:
         raise DatasetError(f"chunk: {error}") from error
 
@@ -182,21 +183,20 @@ def _fill_clock(rows: Rows, samples: Samples, _: SetPoints) -> None:
     put_stamps(rows, "clock", samples.stamps_ns)
 
 
-def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str], bodies: Sequence[str] = (BALL,)) -> Topic:
+def transforms(frames: tuple[Frame, ...], joints: Sequence[str], bodies: Sequence[str] = (BALL,)) -> Topic:
     """``/tf``: tf2_msgs/TFMessage with object and moving bodies in world, and every frame that a joint moves."""
     kind = "tf2_msgs/msg/TFMessage"
     columns = [joints.index(frame.joint) for frame in frames]
-    free = [(WORLD, name, (0.0, 0.0, 0.0)) for name in bodies]
-    pairs = [*free, *((frame.parent, frame.child, frame.translation) for frame in frames)]
-    message = get_message(kind)(transforms=[_make_transform(*pair, (0.0, 0.0, 0.0, 1.0), 0) for pair in pairs])
-    variable = [f"transforms.{n}.{path}" for n in range(len(pairs)) for path in (*_STAMP, "transform.rotation")]
+    free = [Frame(WORLD, name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)) for name in bodies]
+    message, count = make_fixed_transforms([*free, *frames], 0), len(free) + len(frames)
+    variable = [f"transforms.{n}.{path}" for n in range(count) for path in (*_STAMP, "transform.rotation")]
     # The translations of frames that joints turn stand in the template.
     slides = (number for number, frame in enumerate(frames, start=len(free)) if frame.slides)
     moved = [*range(len(free)), *slides]
     layout = MessageLayout(message, [*variable, *(f"transforms.{n}.transform.translation" for n in moved)])
 
     def fill(rows: Rows, samples: Samples, _: SetPoints) -> None:
-        for number in range(len(pairs)):
+        for number in range(count):
             put_stamps(rows, f"transforms.{number}.header.stamp", samples.stamps_ns)
         for number in range(len(bodies)):
             position, rotation, *_velocities = samples.parts_of(number)
@@ -215,26 +215,19 @@ def transforms(frames: tuple[MovingFrame, ...], joints: Sequence[str], bodies: S
 
 def make_fixed_transforms(frames: Sequence[Frame], stamp_ns: int) -> Any:
     """Make the tf2_msgs/TFMessage of frames that never move."""
-    poses = ((frame.parent, frame.child, frame.translation, frame.rotation_xyzw) for frame in frames)
-    return get_message("tf2_msgs/msg/TFMessage")(transforms=[_make_transform(*pose, stamp_ns) for pose in poses])
+    return get_message("tf2_msgs/msg/TFMessage")(transforms=[_make_transform(frame, stamp_ns) for frame in frames])
 
 
-def _make_transform(
-    parent: str,
-    child: str,
-    translation: tuple[float, float, float],
-    rotation_xyzw: tuple[float, float, float, float],
-    stamp_ns: int,
-) -> Any:
-    """Make a geometry_msgs/TransformStamped of the child's pose in its parent: origin [m] and unit quaternion."""
-    x, y, z = translation
-    qx, qy, qz, qw = rotation_xyzw
+def _make_transform(frame: Frame, stamp_ns: int) -> Any:
+    """Make the geometry_msgs/TransformStamped of a frame."""
+    x, y, z = frame.translation
+    qx, qy, qz, qw = frame.rotation_xyzw
     transform = get_message("geometry_msgs/msg/Transform")(
         translation=get_message("geometry_msgs/msg/Vector3")(x=x, y=y, z=z),
         rotation=get_message("geometry_msgs/msg/Quaternion")(x=qx, y=qy, z=qz, w=qw),
     )
     return get_message("geometry_msgs/msg/TransformStamped")(
-        header=make_header(parent, stamp_ns), child_frame_id=child, transform=transform
+        header=make_header(frame.parent, stamp_ns), child_frame_id=frame.child, transform=transform
     )
 
 
@@ -296,11 +289,10 @@ def policy_command(joints: tuple[str, ...]) -> Topic:
 
 def read_policy_joints(message: bytes) -> tuple[str, ...]:
     """Read the names of the joints in a message of `policy_command`."""
-    try:
-        found = deserialize(message, get_message("std_msgs/msg/Float64MultiArray"))
-        return tuple(found.layout.dim[1].label.split(","))
-    except (ValueError, IndexError) as error:
-        raise DatasetError(f"chunk: {error}") from error
+    dimensions = _read_message(message, "std_msgs/msg/Float64MultiArray").layout.dim
+    if len(dimensions) != 2:
+        raise DatasetError("chunk: a command of a policy that names no joints")
+    return tuple(dimensions[1].label.split(","))
 
 
 _TIMED = ("reference", "feedback", "error")

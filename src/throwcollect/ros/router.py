@@ -37,10 +37,7 @@ _PROGRAM = "fast-discovery-server"
 _RUNNING = b"Server is running"
 _STOP_S = 3.0
 _SOON_S = 0.02
-
-
 _LOOK_S = 0.5
-
 _PORT_ATTEMPTS = 5
 
 

@@ -16,7 +16,7 @@ from throwcollect.config.schema import Config
 from throwcollect.engines.body import Vector
 from throwcollect.engines.engine import GROUND
 from throwcollect.engines.pose import Pose
-from throwcollect.episode.frames import WORLD, Frame, FrameTree, MovingFrame, read_frames
+from throwcollect.episode.frames import WORLD, Frame, FrameTree, read_frames
 from throwcollect.episode.record import Samples
 from throwcollect.episode.sensor_topics import label_names
 from throwcollect.errors import ConfigError
@@ -32,7 +32,7 @@ class Joint(NamedTuple):
     """A joint: the part that it hangs on, its frame in that part at 0, its axis, and its column in recorded states."""
 
     parent: int
-    frame: MovingFrame
+    frame: Frame
     offset: Pose
     column: int
 
@@ -126,7 +126,7 @@ class Scene:
                     continue
                 part, pose = found[frame.parent]
                 offset = pose * Pose.of(frame.translation, frame.rotation_xyzw)
-                if isinstance(frame, MovingFrame):
+                if frame.joint:
                     self._joints.append(Joint(part, frame, offset, columns[frame.joint]))
                     part, offset = len(self._joints), Pose()
                 found[frame.child] = part, offset

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -12,18 +13,10 @@ import numpy as np
 from throwcollect.config.schema import Config
 from throwcollect.control import JointTrajectoryController, Trajectory, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.engines.engine import BodyState, SceneBody
-from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import RequestError
 from throwcollect.plan.trials import NO_TARGET, Values
-from throwcollect.sim.pace import (
-    WATCHED_STRETCH_S,
-    Pace,
-    long_stretch_steps,
-    longest_steps,
-    stretch_steps,
-)
-from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
+from throwcollect.sim import pace
 from throwcollect.sim.simulator import STRETCH_S, Simulator
 from throwcollect.units import NS_PER_S
 
@@ -70,7 +63,7 @@ class LiveSimulator(Simulator):
     def __init__(self, config: Config, on_frame: Callable[[], None] = lambda: None) -> None:
         self.state = StateCode.PLAYING
         self.real_time_factor = config.sim.real_time_factor
-        self._pace = Pace()
+        self._pace = pace.Pace()
         self._steps: StepRequest | None = None
         self._spawned: dict[str, SceneBody] = {}
         self._driven_until_ns = 0
@@ -149,8 +142,8 @@ class LiveSimulator(Simulator):
         self.trial.require_free()
         if self.records:
             raise RequestError("RESULT_INCORRECT_STATE", "a recording runs already")
-        if self.trial.setup != TrialSetup(NO_TRIAL, (), self.config):
-            message = "parameters set up a trial, or other physics than the file; a recording has those of the file"
+        if self.trial.config != self.config:
+            message = "parameters set up other physics than the file; a recording has those of the file"
             raise RequestError("RESULT_INCORRECT_STATE", message)
         self.reset()
         self.world.may_rest, self._in_trial, self._sent = True, True, []
@@ -172,12 +165,8 @@ class LiveSimulator(Simulator):
             return None
         return recorded[0], replace(recorded[1], command=np.stack([command, command], axis=1))
 
-    def hand_over(self) -> Episode | None:
-        """Return the episode of a trial that has ended, only once; a recording is none."""
-        return None if self.records else super().hand_over()
-
     def submit(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
-        """Give a goal to a controller, or refuse it; a run begins once all controllers that need a goal have one."""
+        """Give a goal to a controller, or refuse it; the clock runs from then on."""
         if (leased := self.trial.refusal) is not None:
             return leased
         if (refusal := self.give(controller, goal_id, goal)) is None:
@@ -193,7 +182,7 @@ class LiveSimulator(Simulator):
         return cancelled
 
     def follow(self, controller: str, trajectory: Trajectory) -> TrajectoryRefusal | None:
-        """Let a controller follow a trajectory that is no goal, or refuse it; a run begins unless a goal is missing."""
+        """Let a controller follow a trajectory that is no goal, or refuse it; the clock runs from then on."""
         if (leased := self.trial.refusal) is not None:
             return leased
         limb = self.limbs[controller]
@@ -209,19 +198,19 @@ class LiveSimulator(Simulator):
         The stretch has to be short if a client listens (`watched`).
         """
         began_s, since_ns, factor = time.monotonic(), self.now_ns, self.real_time_factor
-        # Long stretches cost the least. Short ones let messages be sent in between, which only watching clients need.
-        stretch_s = STRETCH_S if (self._in_trial or self._steps) and not (watched or factor) else WATCHED_STRETCH_S
-        steps = max(1, round(stretch_s * self.config.sim.physics_hz))
+        hz = self.config.sim.physics_hz
+        if not watched and (self.trial.leased or self._steps):
+            # Long stretches cost the least; in real time, they are as long as requests can wait.
+            steps = max(1, round(min(pace.STRETCH_S * (factor or math.inf), STRETCH_S) * hz))
+        elif factor:
+            steps = pace.count_steps(factor, hz, self._stride, self.world.steps % self._stride)
+        else:
+            steps = round(pace.STRETCH_S * hz)
         if (request := self._steps) is not None:
             request.taken += self.step(min(steps, request.wanted - request.taken))
             if request.is_over:
                 self._steps = None
             return
-        if factor and self.trial.leased and not watched:
-            # Every stretch costs time besides physics, so stretches are as long as requests can wait.
-            steps = long_stretch_steps(factor, self.config.sim.physics_hz, STRETCH_S)
-        elif factor:
-            steps = stretch_steps(factor, self.config.sim.physics_hz, self._stride, self.world.steps % self._stride)
         self.step(steps)
         # A trial ends when its rules say so; a motion by hand, when limbs and object rest, or it rolls for too long.
         if self._in_trial and not (self.records and self.world.end_reason is None):
@@ -238,7 +227,7 @@ class LiveSimulator(Simulator):
         """Simulated time between two messages of feedback [ns]; 0 to send feedback after every stretch."""
         if not self.real_time_factor or self.state != StateCode.PLAYING:
             return 0
-        return longest_steps(self.real_time_factor, self.config.sim.physics_hz) * self._period_ns
+        return round(pace.STRETCH_S * min(1.0, self.real_time_factor) * NS_PER_S)
 
     def request_steps(self, steps: int) -> StepRequest:
         """Have `advance` take physics steps while the clock stands still; trials may end on the way.
@@ -268,10 +257,6 @@ class LiveSimulator(Simulator):
         first, self._published = self._published, self.world.recorded
         return self.world.samples(first)
 
-    def last_sample(self) -> Samples:
-        """Return the sample that was recorded last."""
-        return self.world.samples(self.world.recorded - 1)
-
     def observe(self, controller: str) -> JointTrajectoryController:
         """Return a controller after it has seen the present state of its joints, which its `state` and `query` need."""
         limb = self.limbs[controller]
@@ -289,7 +274,7 @@ class LiveSimulator(Simulator):
 
     def _begin_motion(self) -> None:
         self._driven_until_ns = self.now_ns
-        self._running |= self.trial.has_all_goals
+        self._running = True
 
     def _interrupt_steps(self, reason: str) -> None:
         if self._steps is not None:

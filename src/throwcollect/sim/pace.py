@@ -10,24 +10,18 @@ import time
 
 from throwcollect.units import NS_PER_S
 
-WATCHED_STRETCH_S = 0.05
-"""Simulated time of a stretch while a client watches, and outside of trials: as ros2_controllers send feedback."""
+STRETCH_S = 0.05
+"""Simulated time of a stretch while a client watches, and outside of trials: as ros2_controllers send feedback. In real
+time, stretches are not longer either, because messages wait for their ends."""
 
 _SHORTEST_S = 0.004
 """Real time of the shortest stretch; it is well above the millisecond of work between two stretches."""
-_LONGEST_S = 0.05
-"""Real time of the longest stretch; it is short because messages wait for the end of a stretch."""
 _LATE_S = 0.05
 """Longest delay that is made up for. After a longer one, such as a rest, the schedule begins anew."""
 
 
-def longest_steps(factor: float, hz: int) -> int:
-    """Count the physics steps of the longest stretch, at a factor [-] and a number of steps per simulated second."""
-    return max(1, round(_LONGEST_S * min(1.0, factor) * hz))
-
-
-def stretch_steps(factor: float, hz: int, period: int, phase: int) -> int:
-    """Count the physics steps of one stretch.
+def count_steps(factor: float, hz: int, period: int, phase: int) -> int:
+    """Count the physics steps of one stretch, after which samples leave on time.
 
     Args:
         factor: Simulated over real time [-].
@@ -40,21 +34,10 @@ def stretch_steps(factor: float, hz: int, period: int, phase: int) -> int:
         motion, a stretch may end before the next sample.
     """
     periods = math.ceil(_SHORTEST_S * factor * hz / period)
-    steps = min(periods * period, longest_steps(factor, hz))
+    steps = min(periods * period, max(1, round(STRETCH_S * min(1.0, factor) * hz)))
     # The steps since the last sample count as the beginning of the stretch, so that it ends with a sample. In slow
     # motion, a whole stretch may be no longer than these steps; it is then taken in full, so that time goes on.
     return steps if steps <= phase else steps - phase
-
-
-def long_stretch_steps(factor: float, hz: int, most_s: float) -> int:
-    """Count the physics steps of one stretch while no topic has a subscriber, so that no message has to leave on time.
-
-    Args:
-        factor: Simulated over real time [-].
-        hz: Physics steps per simulated second.
-        most_s: Longest simulated time of a stretch [s].
-    """
-    return max(1, round(min(_LONGEST_S * factor, most_s) * hz))
 
 
 class Pace:

@@ -15,21 +15,20 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.control import GoalResult, TrajectoryGoal, TrajectoryRefusal
+from throwcollect.control import GoalResult, GoalStatus, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder
-from throwcollect.episode.record import ControllerSamples, EpisodeHeader, Samples, find_infinite_columns
+from throwcollect.episode.record import ControllerSamples, EpisodeHeader, GoalOutcome, Samples, find_infinite_columns
 from throwcollect.errors import ThrowcollectError
 from throwcollect.members import explain_failure
 from throwcollect.plan.conditions import Settings
 from throwcollect.plan.trials import NO_TARGET, Trial, Values
 from throwcollect.robots.description import full_description, robot_of, start_posture
-from throwcollect.robots.trajectory import JointTrajectory
 from throwcollect.sensing.recorder import SensorRecorder
 from throwcollect.sim.limb_controller import LimbController
 from throwcollect.sim.policy import Policy, PolicyLoop, make_policy
-from throwcollect.sim.present_trial import PresentTrial, TrialSetup, trial_goals
+from throwcollect.sim.present_trial import PresentTrial, trial_goals
 from throwcollect.sim.world import World
 from throwcollect.tasks.task import task_of, trajectory_of
 from throwcollect.units import NS_PER_S
@@ -138,8 +137,9 @@ class Simulator:
         goals = {} if self.loop else trial_goals(robot_of(config), motion, start_posture(config))
         for limb in self.limbs.values():
             limb.restore()
-        self.trial.setup = TrialSetup(number, tuple(goals), config)
+        self.trial.number, self.trial.config = number, config
         self.reset()
+        self._in_trial = True
         for controller, goal in goals.items():
             # The id of a client's goal is a number. This id is none, so that no client gets the result of this goal.
             if (refusal := self.give(controller, ("trial", number), goal)) is not None:
@@ -161,24 +161,22 @@ class Simulator:
             state: Whether world and controllers go to the start state of the trial.
         """
         self._in_trial, self._sent = False, None
-        self.trial.begin()
-        setup = self.trial.setup
+        self._goals: dict[str, GoalOutcome] = {}
+        number, config = self.trial.number, self.trial.config
         start_ns = self.now_ns
         if time:
             # Each trial has a slot of time of its own, so that stamps in a dataset never overlap.
-            start_ns = 0 if setup.number < 0 else setup.config.trial_start_ns(setup.number)
+            start_ns = 0 if number < 0 else config.trial_start_ns(number)
         if state:
-            self.world.reset(setup.config, start_ns=start_ns)
-            posture = start_posture(setup.config)
+            self.world.reset(config, start_ns=start_ns)
+            posture = start_posture(config)
         else:
             self.world.restart_clock(start_ns)
             posture = self.world.posture()
         for limb in self.limbs.values():
-            limb.reset(start_ns, posture, speed=setup.config.robot.speed_scale)
+            limb.reset(start_ns, posture, speed=config.robot.speed_scale)
         self._collect_results()
         self._command = np.array([posture[joint] for joint in self.world.moving])
-        # After a reset of time or state alone, what follows is not the trial that the plan has drawn.
-        self._in_trial = setup.number >= 0 and time and state
 
     def give(self, controller: str, goal_id: Hashable, goal: TrajectoryGoal) -> TrajectoryRefusal | None:
         """Give a goal to a controller; return its refusal, or None if the controller accepts the goal."""
@@ -186,7 +184,7 @@ class Simulator:
         refusal = limb.refuse_locked(goal.trajectory) or limb.controller.submit(goal_id, goal, self.now_ns)
         self._collect_results()
         if refusal is None:
-            self.trial.note_goal(controller)
+            self._goals[controller] = GoalOutcome(controller, GoalStatus.EXECUTING, 0, "")
         return refusal
 
     def step(self, steps: int) -> int:
@@ -202,22 +200,21 @@ class Simulator:
         return steps - remaining
 
     def hand_over(self) -> Episode | None:
-        """Return the episode of a trial that has ended, only once; None if there is none.
-
-        The episode is judged if `begin` began the trial.
-        """
-        config, motion = self.trial.begun.config, self.trial.motion
-        if (recording := self.take_recording()) is None:
+        """Return the episode of a trial that has ended, with its result, only once; None if there is none."""
+        config, motion = self.trial.config, self.trial.motion
+        if motion is None or (recording := self.take_recording()) is None:
             return None
         header, samples, states = recording
-        if motion is not None:
-            # A trial that a client sets up later starts from the configuration, and not from the values of this trial.
-            self.trial.set_up_nothing()
-        values = self._settings.read_values(config)
-        conditions = self._settings.conditions_of(values, motion.digest if motion else "")
+        # What clients do later starts from the configuration, and not from the values of this trial.
+        self.trial.set_up_nothing()
+        conditions = self._settings.conditions_of(self._settings.read_values(config), motion.digest)
         state, table = self._encoder.encode(samples, states)
         # The samples are judged as readers of the dataset see them: recorded velocities are in the frames of bodies.
-        result = self._judge(config, motion, table.samples, header) if motion else ""
+        if (infinite := next(find_infinite_columns(table.samples), None)) is not None:
+            raise ThrowcollectError(f"trial {header.trial}: {infinite}")
+        # Writing finds results of a wrong kind. They are a fault of the task, too, so writing stands in this block.
+        with explain_failure("tasks", config.task.name, f"judge trial {header.trial}"):
+            result = self._columns.to_json(task_of(config).judge(table.samples, header, motion))
         # What sensors see follows from what is recorded, and is the same when it is rendered later.
         seen = self._sensors.record(config, header.trial, table.samples) if self._sensors else ()
         return Episode(header, state, sensors=seen, result=result, conditions=conditions)
@@ -231,11 +228,11 @@ class Simulator:
         if self.loop is not None and begun:
             samples = replace(samples, command=self.loop.commands(np.arange(len(samples)) * self._stride))
         header = EpisodeHeader(
-            trial=self.trial.begun.number,
+            trial=self.trial.number,
             start_ns=int(samples.stamps_ns[0]),
             end_reason=end_reason,
             contacts=self.world.contacts(),
-            goals=self.trial.outcomes(self.limbs),
+            goals=tuple(self._goals[name] for name in self.limbs if name in self._goals),
             samples=len(samples),
         )
         states = {}
@@ -250,14 +247,6 @@ class Simulator:
         """Return controllers and results of the goals that have ended since the last call, oldest first."""
         results, self._results = self._results, []
         return results
-
-    def _judge(self, config: Config, motion: JointTrajectory, samples: Samples, header: EpisodeHeader) -> str:
-        """Judge a trial; return its result in JSON."""
-        if (infinite := next(find_infinite_columns(samples), None)) is not None:
-            raise ThrowcollectError(f"trial {header.trial}: {infinite}")
-        # Writing finds results of a wrong kind. They are a fault of the task, too, so writing stands in this block.
-        with explain_failure("tasks", config.task.name, f"judge trial {header.trial}"):
-            return self._columns.to_json(task_of(config).judge(samples, header, motion))
 
     def _step_some(self, most: int) -> int:
         """Take at most `most` steps, so that a controller looks at the measured state when it has to."""
@@ -308,4 +297,5 @@ class Simulator:
         for name, limb in self.limbs.items():
             for result in limb.controller.pop_results():
                 self._results.append((name, result))
-                self.trial.note_result(name, result)
+                if name in self._goals:
+                    self._goals[name] = GoalOutcome(name, result.status, result.error_code, result.error_string)

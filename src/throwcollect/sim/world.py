@@ -141,7 +141,6 @@ class World(Observer):
         with explain_failure("engines", self._name, "begin a trial"):
             self.engine.reset(self._settled)
         sim = trial.sim
-        self._base_height = trial.robot.base_height_m
         self.physics_hz = sim.physics_hz
         self._stride = sim.physics_hz // trial.record.rate_hz
         self._last_step = math.ceil(sim.max_trial_s * sim.physics_hz)
@@ -263,11 +262,6 @@ class World(Observer):
         return {**self._locked, **dict(zip(self.moving, self.joints()[0], strict=True))}
 
     @property
-    def robot_base(self) -> BodyState:
-        """The base of the robot, which never moves."""
-        return BodyState((0.0, 0.0, self._base_height))
-
-    @property
     def bodies(self) -> Mapping[str, BodyState]:
         """The object and all other bodies now, by name, with the object first."""
         sample, still = self.engine.state.sample, (body for body in self._scene.bodies if not body.moves)
@@ -322,11 +316,6 @@ class World(Observer):
         """Whether the arm has been standing still, and the object lying on something, for half a second."""
         return self.steps - self._resting_since >= REST_S * self.physics_hz
 
-    @property
-    def object(self) -> BodyState:
-        """The object now."""
-        return object_in(self.engine.state.sample)
-
     def _begin(self, start_ns: int, present: Sample) -> None:
         """Begin to count from the present state."""
         self._start_ns = start_ns
@@ -345,7 +334,13 @@ class World(Observer):
     def _settle(self, trial: Config) -> None:
         """Let the object come to rest where it starts, with the robot still, and keep that state."""
         description = self._describe(trial)
-        self._load(scene_of(trial, description), trial.sim.engine)
+        scene = scene_of(trial, description)
+        self.engine.load(scene)
+        self._scene, self._own_bodies = scene, scene.bodies
+        # The robot as it was loaded stays, while only the object is another one.
+        if scene.robot != self._compared:
+            check_loaded(self.engine, self._name, scene)
+            self._compared = scene.robot
         self.moving, self._locked = description.moving, description.locked
         posture = start_posture(trial)
         offsets = dict(zip(self._joints, joint_offsets(trial).tolist(), strict=True))
@@ -365,14 +360,6 @@ class World(Observer):
                 start = body_of(body.start)
                 self.engine.place(number, replace(start, linear_velocity=body.velocity))
         self._settled = self.engine.state
-
-    def _load(self, scene: Scene, engine: str) -> None:
-        self.engine.load(scene)
-        self._scene, self._own_bodies = scene, scene.bodies
-        # The robot as it was loaded stays, while only the object is another one.
-        if scene.robot != self._compared:
-            check_loaded(self.engine, engine, scene)
-            self._compared = scene.robot
 
     def _describe(self, trial: Config) -> Description:
         """Describe the robot for a trial; the description of the previous trial is kept while it is the same."""

@@ -49,7 +49,7 @@ def test_overlapping_bodies_are_refused(acted_on: str | None, bodies: dict[str, 
 
 def test_the_ball_that_lies_in_the_tool_overlaps_what_reaches_into_it() -> None:
     world = World(Config())
-    x, y, z = world.object.position
+    x, y, z = world.bodies["ball"].position
     world.close()
     pearl = {"shape": "sphere", "radius_m": 0.005, "mass_kg": 0.1}
     assert "ball and pearl overlap by 4" in (check(pearl={**pearl, "position_m": [x, y, z + 0.0255]}) or "")

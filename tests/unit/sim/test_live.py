@@ -13,7 +13,7 @@ from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.live import LiveSimulator, StateCode
-from throwcollect.sim.present_trial import TrialSetup
+from throwcollect.sim.present_trial import trial_goals
 
 CONFIG = Config()
 POSTURE = start_posture(CONFIG)
@@ -42,7 +42,7 @@ def shared() -> Iterator[LiveSimulator]:
 
 @pytest.fixture
 def simulation(shared: LiveSimulator) -> LiveSimulator:
-    shared.trial.setup = TrialSetup(-1, (), CONFIG)
+    shared.trial.set_up_nothing()
     shared.state = StateCode.PLAYING
     shared.reset()
     shared.pop_results()
@@ -57,31 +57,8 @@ def run(simulation: LiveSimulator) -> None:
     pytest.fail("the run does not end")
 
 
-def trial(simulation: LiveSimulator, number: int = 0) -> None:
-    simulation.trial.setup = TrialSetup(number, (ARM, TORSO), CONFIG)
-    simulation.reset()
-    assert simulation.submit(ARM, 1, swing()) is None
-    assert not simulation.running
-    assert simulation.submit(TORSO, 2, goal(TORSO)) is None
-
-
-def test_the_clock_stands_still_until_every_awaited_controller_has_a_goal(simulation: LiveSimulator) -> None:
-    trial(simulation)
-    assert simulation.running
-    assert simulation.now_ns == CONFIG.trial_start_ns(0)
-
-
-def test_a_trajectory_without_a_goal_waits_for_the_awaited_goals(simulation: LiveSimulator) -> None:
-    simulation.trial.setup = TrialSetup(0, (ARM,), CONFIG)
-    simulation.reset()
-    assert simulation.follow(HEAD, goal(HEAD).trajectory) is None
-    assert not simulation.running
-    assert simulation.submit(ARM, 1, swing()) is None
-    assert simulation.running
-
-
 def test_a_trial_yields_its_episode_once_and_with_the_results_of_its_goals(simulation: LiveSimulator) -> None:
-    trial(simulation, 3)
+    simulation.begin(3, {})
     run(simulation)
     episode = simulation.take_recording()
     assert episode is not None
@@ -94,10 +71,10 @@ def test_a_trial_yields_its_episode_once_and_with_the_results_of_its_goals(simul
 
 
 def test_the_same_trial_gives_the_same_samples_however_it_is_divided(simulation: LiveSimulator) -> None:
-    trial(simulation)
+    simulation.begin(0, {})
     run(simulation)
     whole = simulation.take_recording()
-    trial(simulation)
+    simulation.begin(0, {})
     simulation.state = StateCode.PAUSED
     for steps in (1, 2, 77, 3, 400, 1000):
         simulation.step(steps)
@@ -110,11 +87,12 @@ def test_the_same_trial_gives_the_same_samples_however_it_is_divided(simulation:
 
 
 def test_joints_are_at_the_trajectory_when_their_sample_is_taken(simulation: LiveSimulator) -> None:
-    trial(simulation)
+    simulation.begin_recording()
+    assert simulation.submit(ARM, 1, swing()) is None
     run(simulation)
-    episode = simulation.take_recording()
-    assert episode is not None
-    samples = episode[1]
+    recorded = simulation.end_recording()
+    assert recorded is not None
+    samples = recorded[1]
     x = np.minimum((samples.stamps_ns - samples.stamps_ns[0]) / 1e9, 1.0)
     wanted = -1.9 + (10 * x**3 - 15 * x**4 + 6 * x**5) * 1.4
     assert np.abs(samples.position[:, 10] - wanted).max() < 1e-4
@@ -165,7 +143,7 @@ def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then
         simulation.world.place("ball", BodyState((2.0, 0.0, 1.0)))
         assert simulation.submit(ARM, number, goal(ARM, duration_s)) is None
         run(simulation)
-        ball = simulation.world.object
+        ball = simulation.world.bodies["ball"]
         assert ball.position == pytest.approx((2.0, 0.0, config.ball.radius_m), abs=2e-3)
         assert np.hypot(*ball.linear_velocity[:2]) + abs(ball.linear_velocity[2]) < 0.01
     simulation.close()
@@ -174,14 +152,14 @@ def test_without_a_trial_the_ground_stops_the_ball_and_the_clock_runs_until_then
 def test_a_ball_that_rolls_for_ever_keeps_the_clock_running_for_as_long_as_a_trial(simulation: LiveSimulator) -> None:
     assert simulation.submit(ARM, 1, swing()) is None
     run(simulation)
-    rolling = simulation.world.object
+    rolling = simulation.world.bodies["ball"]
     assert rolling.position[2] == pytest.approx(CONFIG.ball.radius_m, abs=1e-3)
     assert rolling.linear_velocity[0] > 1.0
     assert simulation.now_ns / 1e9 == pytest.approx(1.0 + CONFIG.sim.max_trial_s, abs=0.1)
 
 
 def test_a_reset_aborts_goals_and_goes_back_to_the_start(simulation: LiveSimulator) -> None:
-    trial(simulation)
+    simulation.begin(0, {})
     simulation.advance(watched=True)
     simulation.reset()
     assert [(result.status, result.error_string) for _, result in simulation.pop_results()] == [
@@ -235,31 +213,13 @@ def test_a_reset_or_quitting_interrupts_steps(interrupt, reason: str, simulation
     assert not simulation.running
 
 
-@pytest.mark.parametrize("of_time", [True, False])
-def test_only_a_reset_of_time_and_state_together_begins_a_trial(of_time: bool, simulation: LiveSimulator) -> None:
-    trial(simulation)
-    simulation.advance(watched=True)
-    simulation.reset(time=of_time, state=not of_time)
-    assert simulation.now_ns == CONFIG.trial_start_ns(0) + (0 if of_time else 50_000_000)
-    assert [result.error_string for _, result in simulation.pop_results()] == ["simulation was reset"] * 2
-    assert simulation.submit(ARM, 3, swing()) is None
-    assert simulation.submit(TORSO, 4, goal(TORSO)) is None
-    run(simulation)
-    assert simulation.take_recording() is None
-    simulation.reset()
-    assert simulation.submit(ARM, 5, swing()) is None
-    assert simulation.submit(TORSO, 6, goal(TORSO)) is None
-    run(simulation)
-    assert simulation.take_recording() is not None
-
-
 def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: LiveSimulator) -> None:
     simulation.set_state(StateCode.PAUSED)
     assert simulation.submit(ARM, 1, swing()) is None
     simulation.step(250)
     simulation.reset(state=False)
     before = simulation.world.joints()[0]
-    ball = simulation.world.object
+    ball = simulation.world.bodies["ball"]
     assert simulation.now_ns == 0
     assert simulation.world.recorded == 1
     assert simulation.world.samples().object_position[0].tolist() == list(ball.position)
@@ -271,7 +231,7 @@ def test_a_reset_of_time_leaves_the_robot_where_it_is(simulation: LiveSimulator)
 def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:
     config = Config.model_validate({"record": {"topics": ["joint_states", "ball/odometry", "controller_state"]}})
     simulation = LiveSimulator(config)
-    trial(simulation)
+    simulation.begin(0, {})
     run(simulation)
     kept = simulation.take_recording()
     assert kept is not None
@@ -283,23 +243,6 @@ def test_set_points_are_kept_with_each_sample_when_they_are_recorded() -> None:
     simulation.close()
 
 
-def test_a_result_that_comes_with_the_episode_is_still_reported() -> None:
-    config = Config.model_validate({"record": {"topics": ["joint_states", "ball/odometry", "controller_state"]}})
-    simulation = LiveSimulator(config)
-    trial(simulation)
-    run(simulation)
-    lasted_s = (simulation.now_ns - config.trial_start_ns(0)) / 1e9
-    simulation.reset()
-    simulation.pop_results()
-    simulation.submit(ARM, 1, swing())
-    simulation.submit(TORSO, 2, goal(TORSO, lasted_s + 1 / config.sim.physics_hz))
-    run(simulation)
-    assert [name for name, _ in simulation.pop_results()] == [ARM]
-    assert simulation.take_recording() is not None
-    assert [(name, result.status) for name, result in simulation.pop_results()] == [(TORSO, GoalStatus.SUCCEEDED)]
-    simulation.close()
-
-
 @pytest.mark.parametrize(("leased", "watched", "samples"), [(True, False, 12), (True, True, 1), (False, False, 1)])
 def test_a_leased_trial_without_listeners_advances_in_long_stretches(
     simulation: LiveSimulator, *, leased: bool, watched: bool, samples: int
@@ -307,7 +250,7 @@ def test_a_leased_trial_without_listeners_advances_in_long_stretches(
     if leased:
         simulation.begin(0, {})
     else:
-        trial(simulation)
+        assert simulation.submit(ARM, 1, swing()) is None
     simulation.real_time_factor = 1.0
     simulation.fresh_samples()
     simulation.advance(watched=watched)
@@ -333,11 +276,9 @@ def test_samples_come_one_by_one_after_steps_that_ended_between_two(simulation: 
 def test_after_a_failed_reset_the_clock_stands_still_until_one_succeeds() -> None:
     config = Config.model_validate({"sim": {"engine": "ballistic"}, "tool": {"cup_floor_radius_m": 0.006}})
     simulation = LiveSimulator(config)
-    simulation.trial.setup = TrialSetup(0, (), config)
-    simulation.reset()
     simulation.submit(ARM, 1, swing())
     simulation.advance(watched=True)
-    simulation.trial.setup = TrialSetup(0, (), with_values(config, {"ball.radius_m": 0.005}))
+    simulation.trial.config = with_values(config, {"ball.radius_m": 0.005})
     with pytest.raises(ConfigError, match=r"tool\.cup_floor_radius_m"):
         simulation.reset()
     assert simulation.submit(ARM, 2, swing()) is None
@@ -346,25 +287,25 @@ def test_after_a_failed_reset_the_clock_stands_still_until_one_succeeds() -> Non
     with pytest.raises(RequestError, match="there is no start state until a reset succeeds"):
         simulation.request_steps(1)
     simulation.state = StateCode.PLAYING
-    simulation.trial.setup = TrialSetup(0, (), config)
+    simulation.trial.config = config
     simulation.reset()
     simulation.submit(ARM, 3, swing())
     run(simulation)
-    episode = simulation.take_recording()
-    assert episode is not None
-    assert [each.status for each in episode[0].goals] == [4]
+    assert [result.status for _, result in simulation.pop_results()][-1] == GoalStatus.SUCCEEDED
 
 
-def test_recording_is_the_same_as_a_trial_by_hand(simulation: LiveSimulator) -> None:
-    trial(simulation)
+def test_recording_is_the_same_as_a_trial_with_its_goals(simulation: LiveSimulator) -> None:
+    simulation.begin(0, {})
+    motion = simulation.trial.motion
+    assert motion is not None
     run(simulation)
     handed = simulation.hand_over()
     assert handed is not None
-    by_hand = handed.samples(TALOS.joints)
-    simulation.trial.set_up_nothing()
+    leased = handed.samples(TALOS.joints)
+    simulation.pop_results()
 
     simulation.begin_recording()
-    for controller, wish in ((ARM, swing()), (TORSO, goal(TORSO))):
+    for controller, wish in trial_goals(TALOS, motion, POSTURE).items():
         assert simulation.submit(controller, controller, wish) is None
     run(simulation)
     assert simulation.hand_over() is None
@@ -373,8 +314,8 @@ def test_recording_is_the_same_as_a_trial_by_hand(simulation: LiveSimulator) -> 
     assert recorded is not None
     header, samples = recorded
     assert (header.end_reason, len(header.goals)) == ("landed", 2)
-    assert np.array_equal(samples.position, by_hand.position)
-    assert np.array_equal(samples.object_position, by_hand.object_position)
+    assert np.array_equal(samples.position, leased.position)
+    assert np.array_equal(samples.object_position, leased.object_position)
     # Commands are those of the next sample; the motors have followed them by then.
     moved = [TALOS.joints.index(joint) for joint in CONFIG.moving_joints]
     assert samples.command.shape == (len(samples), 2, len(moved))
@@ -411,7 +352,7 @@ def test_reset_ends_a_recording_without_an_episode(simulation: LiveSimulator) ->
         simulation.begin_recording()
     simulation.reset()
     assert not simulation.records
-    simulation.trial.setup = TrialSetup(-1, (), with_values(CONFIG, {"ball.mass_kg": 0.1}))
+    simulation.trial.config = with_values(CONFIG, {"ball.mass_kg": 0.1})
     with pytest.raises(RequestError, match="other physics than the file"):
         simulation.begin_recording()
 

@@ -14,7 +14,7 @@ from throwcollect.engines.ballistic.ballistic_engine import BallisticEngine
 from throwcollect.engines.engine import Observer, Steps
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import MemberError, ThrowcollectError
-from throwcollect.sim.present_trial import TrialSetup
+from throwcollect.sim.present_trial import NO_TRIAL
 from throwcollect.sim.simulator import Simulator
 from throwcollect.tasks.task import task_of
 
@@ -79,22 +79,10 @@ def test_a_dropped_trial_yields_no_episode(simulator: Simulator) -> None:
     assert simulator.now_ns == 0
 
 
-def test_a_setup_during_a_trial_is_only_for_the_next_one(simulator: Simulator) -> None:
-    simulator.trial.setup = TrialSetup(3, (), with_values(CONFIG, {"ball.mass_kg": 0.05}))
-    simulator.reset()
-    simulator.step(100)
-    simulator.trial.setup = TrialSetup(4, (), with_values(CONFIG, {"ball.mass_kg": 0.06}))
-    simulator.step(100_000)
-    episode = simulator.hand_over()
-    assert episode is not None
-    assert episode.header.trial == 3
-    assert '{"ball.mass_kg": 0.05}' in episode.conditions.split("\n")
-
-
-def test_after_a_leased_trial_the_setup_is_the_configuration_again(simulator: Simulator) -> None:
+def test_after_a_leased_trial_the_physics_are_those_of_the_configuration_again(simulator: Simulator) -> None:
     simulator.begin(3, VALUES)
     finish(simulator)
-    assert simulator.trial.setup == TrialSetup(-1, (), CONFIG)
+    assert (simulator.trial.number, simulator.trial.config) == (NO_TRIAL, CONFIG)
 
 
 @pytest.fixture

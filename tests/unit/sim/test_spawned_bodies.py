@@ -71,10 +71,10 @@ def step(simulation: LiveSimulator, steps: int) -> None:
 
 def test_a_spawned_body_falls_on_the_scene_and_everything_else_stays(simulation: LiveSimulator) -> None:
     call = Services(simulation)
-    before = simulation.world.object.position
+    before = simulation.world.bodies["ball"].position
     answer = call("spawn_entity", name="cube", resource_string=CUBE, initial_pose=at(1.5, -1.0, 0.7))
     assert (answer.result.result, answer.entity_name) == (Result.RESULT_OK, "cube")
-    assert simulation.world.object.position == pytest.approx(before, abs=1e-9)
+    assert simulation.world.bodies["ball"].position == pytest.approx(before, abs=1e-9)
     step(simulation, 500)
     states = simulation.world.bodies
     assert states["cube"].position == pytest.approx((1.5, -1.0, 0.6), abs=2e-3)
@@ -97,7 +97,7 @@ def test_nothing_of_a_spawned_body_reaches_a_trial(simulation: LiveSimulator) ->
     alone = Simulator(simulation.config)
     expected = alone.run(TRIAL)
     alone.close()
-    x, y, z = simulation.world.object.position
+    x, y, z = simulation.world.bodies["ball"].position
     # In the way of the throw.
     wall = place_spawned(read_spawned(CUBE), "wall", BodyState((x + 0.3, y, z + 0.3)))
     simulation.spawn(wall)

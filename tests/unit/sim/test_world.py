@@ -132,7 +132,7 @@ def test_a_ball_that_never_rises_above_the_landing_plane_comes_to_rest_on_the_gr
     world.run(commands[50:])
     assert world.end_reason == "rest"
     assert [contact.body for contact in world.contacts()] == ["spoon", "ground"]
-    assert world.object.position[2] == pytest.approx(trial.ball.radius_m, abs=1e-3)
+    assert world.bodies["ball"].position[2] == pytest.approx(trial.ball.radius_m, abs=1e-3)
     world.close()
 
 
@@ -188,14 +188,14 @@ def test_the_ball_can_be_put_anywhere(world):
     state = BodyState((1.0, 2.0, 3.0), (0.0, 0.6, 0.0, 0.8), (0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
     world.place("ball", state)
     for name, value in vars(state).items():
-        assert getattr(world.object, name) == pytest.approx(value, abs=1e-15)
+        assert getattr(world.bodies["ball"], name) == pytest.approx(value, abs=1e-15)
     assert world.recorded == 1
     start = world.samples()
     assert start.object_position.tolist() == [[1, 2, 3]]
     assert start.object_angular_velocity[0] == pytest.approx((1, 2, 3), abs=1e-15)
     world.run(still(CONFIG, world, 2))
     assert world.contacts()[0].end_ns == 2_000_000
-    assert world.object.linear_velocity == pytest.approx([0.1, 0.2, 0.3 - 9.81 * 0.004])
+    assert world.bodies["ball"].linear_velocity == pytest.approx([0.1, 0.2, 0.3 - 9.81 * 0.004])
 
 
 def test_a_ball_on_the_robot_touches_the_link_by_name(world):

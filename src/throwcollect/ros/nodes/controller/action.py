@@ -78,14 +78,9 @@ class ControllerAction:
             goal.result.set_result(result)
 
     @property
-    def has_subscribers(self) -> bool:
-        """Whether feedback has subscribers."""
-        return self._node.count_subscribers(self._feedback_topic) > 0
-
-    @property
     def watched(self) -> bool:
         """Whether a goal has been taken and feedback has subscribers."""
-        return bool(self._goals) and self.has_subscribers
+        return bool(self._goals) and self._node.count_subscribers(self._feedback_topic) > 0
 
     @property
     def owes_feedback(self) -> bool:

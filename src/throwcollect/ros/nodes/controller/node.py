@@ -51,11 +51,6 @@ class ControllerNode(Node):
         self._states = self.create_publisher(JointTrajectoryControllerState, "~/controller_state", _STATES)
 
     @property
-    def has_subscribers(self) -> bool:
-        """Whether the controller's state or its feedback has subscribers."""
-        return self.wants_states or self.action.has_subscribers
-
-    @property
     def watched(self) -> bool:
         """Whether the controller's state, or the feedback of a goal that was taken, has subscribers."""
         return self.wants_states or self.action.watched

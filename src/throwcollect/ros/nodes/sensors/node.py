@@ -24,7 +24,7 @@ from throwcollect.errors import ConfigError
 from throwcollect.own_process import make_command
 from throwcollect.robots.description import full_description
 from throwcollect.robots.surroundings import moving_bodies_of
-from throwcollect.ros import DurabilityPolicy, Node, Parameter, Publisher, QoSProfile, get_message, graph_changes
+from throwcollect.ros import DurabilityPolicy, Node, Parameter, Publisher, QoSProfile, get_message
 from throwcollect.ros.msg import JointState, Odometry, SetParametersResult, String
 from throwcollect.ros.nodes import descriptors
 from throwcollect.ros.serving import begin_to_serve
@@ -57,7 +57,6 @@ class SensorNode(Node):
         self._positions: list[float] = []
         self._poses: dict[str, Pose] = {}
         self._stamp_ns = 0
-        self._noticed_changes = -1
         self._states: list[Any] = []
         self._scene, self._declared = Scene.of(config), set[str]()
         self._described = self.create_publisher(String, NAME, LATCHED)
@@ -82,6 +81,7 @@ class SensorNode(Node):
                     self._made[topic.name] = self.create_publisher(kind, topic.name.lstrip("/"), _SAMPLED)
         self._frames = dict.fromkeys(config.sensors, 0)
         self._due_s = dict.fromkeys(config.sensors, 0.0)
+        self._listened: dict[str, list[SensorTopic]] = {}
         self._find_listened()
         # Clients get to know this before the answer to their request.
         described = [vars(describe_sensor(name, config)) for name in config.sensors]
@@ -127,12 +127,13 @@ class SensorNode(Node):
 
     def _find_listened(self) -> None:
         """Find the topics with subscribers, and listen to the simulation if there are any."""
-        self._listened: dict[str, list[SensorTopic]] = {
+        listened = {
             name: [topic for topic in topics.values() if self._made[topic.name].get_subscription_count()]
             for name, topics in self._topics.items()
         }
-        # A new subscriber gets a frame even if time stands still.
-        self._shown_ns: dict[str, int] = {}
+        if listened != self._listened:
+            # A new subscriber gets a frame even if time stands still.
+            self._listened, self._shown_ns = listened, dict[str, int]()
         if any(self._listened.values()) and not self._states:
             self._states = [self.create_subscription(JointState, "joint_states", self._take_joints, _NEWEST)]
             for number, body in enumerate(moving_bodies_of(self._config)):
@@ -155,9 +156,7 @@ class SensorNode(Node):
         """Publish the frames that are due."""
         if not self._is_declared:
             self._declare()
-        if (changes := graph_changes(self)) != self._noticed_changes:
-            self._noticed_changes = changes
-            self._find_listened()
+        self._find_listened()
         bodies = [self._poses.get(body) for body in moving_bodies_of(self._config)]
         if not self._positions or None in bodies:
             return
@@ -195,13 +194,9 @@ class SensorProcess:
             node.create_publisher(get_message(topic.type_name), topic.name.lstrip("/"), _SAMPLED) for topic in topics
         ] + [node.create_publisher(String, NAME, LATCHED)]
         self._process: subprocess.Popen[bytes] | None = None
-        self._noticed_changes = -1
 
     def follow_up(self) -> None:
         """Start the node if it is wanted and does not run."""
-        if (changes := graph_changes(self._node)) == self._noticed_changes:
-            return
-        self._noticed_changes = changes
         wanted = any(publisher.get_subscription_count() for publisher in self._offered)
         if wanted and (self._process is None or self._process.poll() is not None):
             words = ["sensors", str(self._file), "--namespace", self._node.get_namespace()]

@@ -142,8 +142,8 @@ class SimulationControl:
 
     def _read_state(self, name: str) -> EntityState:
         self._require(name)
-        world = self._simulation.world
-        states = {self._robot: world.robot_base, **world.bodies}
+        base = BodyState((0.0, 0.0, self._simulation.config.robot.base_height_m))
+        states = {self._robot: base, **self._simulation.world.bodies}
         return _to_message(states[name], self._simulation.now_ns)
 
     def _require(self, name: str) -> None:

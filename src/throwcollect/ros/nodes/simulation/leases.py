@@ -22,6 +22,7 @@ class LeaseQueue:
         self._running: Lease | None = None
         self._waiting: deque[Lease] = deque()
         self._done: deque[str] = deque(maxlen=_REMEMBERED)
+        self._handed: list[Episode | TrialRefusal] = []
 
     def replace(self, leases: Iterable[Lease]) -> None:
         """Have these trials simulated in this order, and no others; the present trial goes on if it is among them."""
@@ -33,47 +34,44 @@ class LeaseQueue:
             if self._running is None:
                 self._simulator.drop()
         self._waiting = deque(lease for lease in pending if lease is not self._running)
+        self._begin_next()
 
-    def clear(self) -> None:
-        """Forget all leases; the trial that runs goes on."""
-        self._running = None
-        self._waiting.clear()
+    def fail(self, error: ThrowcollectError) -> None:
+        """Refuse the trial that runs, in which the engine has failed, and begin the next one.
 
-    def begin_next(self) -> TrialRefusal | None:
-        """Begin the next trial if none runs; return the refusal of a trial that cannot begin."""
-        if self._running is not None or not self._waiting:
-            return None
-        lease = self._waiting.popleft()
-        try:
-            self._simulator.begin(lease.trial, lease.values, seed=lease.seed, target=lease.target)
-        except ThrowcollectError as error:
-            self._simulator.drop()
-            return self._refuse(lease, error)
-        self._running = lease
-        return None
+        Raises:
+            ThrowcollectError: The error, if no lease runs.
+        """
+        if self._running is None:
+            raise error
+        self._refuse(self._running, error)
+        self._begin_next()
 
-    def fail(self, error: ThrowcollectError) -> TrialRefusal | None:
-        """Drop the trial that runs, in which the engine has failed; return its refusal, or None if no lease runs."""
-        lease, self._running = self._running, None
-        if lease is None:
-            return None
+    def collect(self) -> list[Episode | TrialRefusal]:
+        """Return episodes and refusals of trials that have ended since the last call, and begin the next trial."""
+        if (lease := self._running) is not None:
+            try:
+                if (episode := self._simulator.hand_over()) is not None:
+                    self._end(lease, episode)
+            except ThrowcollectError as error:
+                self._refuse(lease, error)
+            self._begin_next()
+        handed, self._handed = self._handed, []
+        return handed
+
+    def _begin_next(self) -> None:
+        while self._running is None and self._waiting:
+            self._running = lease = self._waiting.popleft()
+            try:
+                self._simulator.begin(lease.trial, lease.values, seed=lease.seed, target=lease.target)
+            except ThrowcollectError as error:
+                self._refuse(lease, error)
+
+    def _refuse(self, lease: Lease, error: ThrowcollectError) -> None:
         self._simulator.drop()
-        return self._refuse(lease, error)
+        self._end(lease, TrialRefusal(lease.trial, str(error)))
 
-    def hand_over(self) -> Episode | TrialRefusal | None:
-        """Return the episode of the trial that has just ended, or its refusal; None if no trial has ended."""
-        try:
-            episode = self._simulator.hand_over()
-        except ThrowcollectError as error:
-            # Only episodes of leased trials are judged, so only they can be refused.
-            lease, self._running = self._running, None
-            return self._refuse(lease, error) if lease else None
-        # The episode of a trial that a client has set up by hand belongs to no lease.
-        if episode is not None and self._running is not None:
-            self._done.append(self._running.token)
-            self._running = None
-        return episode
-
-    def _refuse(self, lease: Lease, error: ThrowcollectError) -> TrialRefusal:
+    def _end(self, lease: Lease, handed: Episode | TrialRefusal) -> None:
+        self._running = None
         self._done.append(lease.token)
-        return TrialRefusal(lease.trial, str(error))
+        self._handed.append(handed)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from throwcollect.config.key import Effect
 from throwcollect.config.schema import FASTEST, SLOWEST, Config
-from throwcollect.config.sweep import MOST_TRIALS
 from throwcollect.config.values import leaves, sweepable_keys, with_values
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import pack
@@ -28,7 +27,6 @@ from throwcollect.ros import (
     QoSProfile,
     Time,
     get_message,
-    graph_changes,
     provide_time,
 )
 from throwcollect.ros.msg import SetParametersResult, String, UInt8MultiArray
@@ -40,7 +38,6 @@ from throwcollect.ros.nodes.simulation.spawning import SpawningServices
 from throwcollect.ros.nodes.simulation.stepping import Stepping
 from throwcollect.run_key import Signer
 from throwcollect.sim.live import LiveSimulator, StateCode
-from throwcollect.sim.present_trial import NO_TRIAL, TrialSetup
 from throwcollect.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -50,10 +47,6 @@ _CLOCK = "rosgraph_msgs/msg/Clock"
 Clock: Any = get_message(_CLOCK)
 
 _EPISODE = "episode"
-NUMBER, CONTROLLERS = "trial.number", "trial.controllers"
-"""Parameters that set up a trial by hand."""
-_NO_CONTROLLERS = [""]
-"""Value of the parameter for no controllers; a list with nothing in it would not tell the type of its elements."""
 _LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _SAMPLED = QoSProfile(depth=100)
 _WHOLE = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -104,12 +97,9 @@ class SimulationNode(Node):
         self._controllers = {name: ControllerNode(self, simulation, name) for name in simulation.limbs}
         self._manager = ControllerManager(self, simulation)
         self._listened: list[tuple[Topic, Publisher]] = []
-        self._subscribed: list[ControllerNode] = []
-        self._noticed_changes = -1
         self._published_at = 0.0
         self._published_ns = -1
         self._signer = Signer.of_environment()
-        self._restoring = False
         self._requested: tuple[Lease, ...] = ()
         SimulationControl(self, simulation)
         SpawningServices(self, simulation)
@@ -142,17 +132,14 @@ class SimulationNode(Node):
     def watched(self) -> bool:
         """Whether samples, states or feedback have subscribers."""
         self._notice_listeners()
-        return bool(self._listened) or any(controller.watched for controller in self._subscribed)
+        return bool(self._listened) or any(controller.watched for controller in self._controllers.values())
 
     def advance(self) -> None:
         """Run for a stretch of time; a leased trial in which an engine of another package fails is refused."""
         try:
             self._simulation.advance(watched=self.watched)
         except MemberError as error:
-            if (refusal := self._leases.fail(error)) is None:
-                raise
-            self._begin_next()
-            self._episodes.publish(pack(refusal, self._signer))
+            self._leases.fail(error)
 
     def follow_up(self) -> None:
         """Publish what has happened since the last call: time, samples, feedback, results, the episode."""
@@ -164,11 +151,10 @@ class SimulationNode(Node):
             self._controllers[name].action.finish(result)
         self._notice_listeners()
         self._publish_samples()
-        for controller in self._subscribed:
+        for controller in self._controllers.values():
             controller.publish_state()
-        if (handed := self._leases.hand_over()) is not None:
-            # The next trial begins before the episode is sent, so that no client can reach a controller in between.
-            self._begin_next()
+        # The next trial begins before the episode is sent, so that no client can reach a controller in between.
+        for handed in self._leases.collect():
             self._episodes.publish(pack(handed, self._signer))
         self._stepping.follow_up()
         if self._recording is not None:
@@ -192,7 +178,7 @@ class SimulationNode(Node):
         samples: Samples = self._simulation.fresh_samples()
         if not len(samples) and self._rests and time.monotonic() - self._published_at >= _REPEAT_S:
             # Robots go on to publish their state while they rest.
-            samples = self._simulation.last_sample()
+            samples = self._simulation.world.samples(self._simulation.world.recorded - 1)
         if len(samples):
             self._published_at = time.monotonic()
         columns = [(publisher, topic.encode(samples, {})) for topic, publisher in self._listened]
@@ -205,7 +191,7 @@ class SimulationNode(Node):
     def _rests(self) -> bool:
         """Whether time stands still for lack of work; never during a trial, of which each sample is published once."""
         simulation = self._simulation
-        return simulation.state == StateCode.PLAYING and not simulation.running and simulation.trial.begun.number < 0
+        return simulation.state == StateCode.PLAYING and not simulation.running and not simulation.trial.leased
 
     def _publish_steps(self, samples: Samples) -> None:
         """Publish the time after the steps of a paused simulation, because they may end between two samples."""
@@ -221,14 +207,9 @@ class SimulationNode(Node):
                 publisher.publish(message)
 
     def _notice_listeners(self) -> None:
-        """Find out which topics have subscribers, if the graph has changed since the last time."""
-        changes = graph_changes(self)
-        if changes == self._noticed_changes:
-            return
-        self._noticed_changes = changes
+        """Find out which topics have subscribers."""
         self._listened = [(topic, publisher) for topic, publisher in self._live if publisher.get_subscription_count()]
-        self._subscribed = [controller for controller in self._controllers.values() if controller.has_subscribers]
-        self._simulation.watch(controller.controller for controller in self._subscribed if controller.wants_states)
+        self._simulation.watch(name for name, controller in self._controllers.items() if controller.wants_states)
 
     def _publish_latched(self, channels: Channels) -> None:
         """Publish what stays; by a parameter, a client gives viewers another description to draw."""
@@ -251,11 +232,6 @@ class SimulationNode(Node):
         physics = set(sweepable_keys(config, Effect.PHYSICS))
         shown = {leaf.name: leaf.value for leaf in leaves(config) if leaf.key.effect not in _HIDDEN}
         self._physics = {key: float(value) for key, value in shown.items() if key in physics}
-        numbers = [descriptors.integer_range(NO_TRIAL, MOST_TRIALS - 1)]
-        about_number = "Number of the trial that the next reset begins, from 0; -1 for none, which also ends a lease."
-        self.declare_parameter(NUMBER, NO_TRIAL, ParameterDescriptor(description=about_number, integer_range=numbers))
-        about_controllers = "Controllers that must have a goal before the clock of a trial runs; with none, any goal."
-        self.declare_parameter(CONTROLLERS, _NO_CONTROLLERS, ParameterDescriptor(description=about_controllers))
         about_leases = "Trials that a coordinator wants, in JSON with its signatures, instead of those before."
         self.declare_parameter(LEASES, "", ParameterDescriptor(description=about_leases))
         factor = config.sim.real_time_factor or _NO_LIMIT
@@ -282,7 +258,7 @@ class SimulationNode(Node):
                 # Trials begin only in `_take_leases`, because a callback that is called after this one may still refuse
                 # the parameters.
                 self._requested = self._read_leases(values)
-            elif not self._restoring:
+            else:
                 self._prepare(values)
         except (ConfigError, DatasetError) as error:
             return SetParametersResult(successful=False, reason=str(error))
@@ -304,29 +280,16 @@ class SimulationNode(Node):
         """Begin the trials that a coordinator has asked for, and undo what clients have set."""
         if not any(parameter.name == LEASES and parameter.value for parameter in parameters):
             return
-        self._leases.replace(self._requested)
         self._restore_parameters()
-        self._begin_next()
-
-    def _begin_next(self) -> None:
-        while (refusal := self._leases.begin_next()) is not None:
-            self._episodes.publish(pack(refusal, self._signer))
+        self._leases.replace(self._requested)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
-        """Set up what the next reset prepares, unless the simulation is leased; a negative number ends the lease."""
+        """Set up the physics that the next reset prepares, unless the simulation is leased."""
         trial = self._simulation.trial
         changed = [name for name in values if name not in _NOT_RECORDED]
-        if trial.leased and changed == [NUMBER] and values[NUMBER] < 0:
-            self._leases.clear()
-            trial.set_up_nothing()
-        elif trial.leased and changed:
+        if trial.leased and changed:
             raise ConfigError(f"{changed[0]}: {trial.lease_in_words}")
-        controllers = tuple(filter(None, values.get(CONTROLLERS, trial.setup.controllers)))
-        if unknown := [name for name in controllers if name not in self._simulation.limbs]:
-            raise ConfigError(f"no controller {unknown[0]!r}")
-        config = with_values(trial.setup.config, {key: values[key] for key in self._physics if key in values})
-        if changed:
-            trial.setup = TrialSetup(int(values.get(NUMBER, trial.setup.number)), controllers, config)
+        trial.config = with_values(trial.config, {key: values[key] for key in self._physics if key in values})
 
     def _check_factor(self, factor: float) -> None:
         if factor != _NO_LIMIT and not SLOWEST <= factor <= FASTEST:
@@ -345,17 +308,11 @@ class SimulationNode(Node):
         """Undo what clients have changed of the parameters; of the real-time factor, only slow motion is undone."""
         for controller in self._controllers.values():
             controller.parameter_server.restore()
-        configured = {NUMBER: NO_TRIAL, CONTROLLERS: _NO_CONTROLLERS, **self._physics}
-        stray = {key: value for key, value in configured.items() if self.get_parameter(key).value != value}
+        stray = {key: value for key, value in self._physics.items() if self.get_parameter(key).value != value}
         if self._hangs(self.get_parameter(_FACTOR).value):
             stray[_FACTOR] = self._simulation.config.sim.real_time_factor or _NO_LIMIT
         if stray:
-            # Setting parameters calls `_set_up` again, which must not prepare a trial by hand from these parameters.
-            self._restoring = True
-            try:
-                self.set_parameters([Parameter(key, value=value) for key, value in stray.items()])
-            finally:
-                self._restoring = False
+            self.set_parameters_atomically([Parameter(key, value=value) for key, value in stray.items()])
 
 
 def record_all_topics(config: Config) -> Config:

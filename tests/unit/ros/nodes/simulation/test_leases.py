@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
 from throwcollect.episode.episode_message import TrialRefusal
 from throwcollect.errors import ThrowcollectError
 from throwcollect.plan.lease import Lease
@@ -41,32 +43,28 @@ def queue_of(*leases: Lease) -> tuple[LeaseQueue, Runner]:
     runner = Runner()
     queue = LeaseQueue(runner)  # type: ignore[arg-type]
     queue.replace(leases)
-    assert queue.begin_next() is None
     return queue, runner
 
 
 def end_trial(queue: LeaseQueue, runner: Runner) -> None:
     runner.yields = "an episode"
-    assert queue.hand_over() == "an episode"
-    assert queue.begin_next() is None
+    assert queue.collect() == ["an episode"]
 
 
 def test_leased_trials_are_done_in_order() -> None:
     queue, runner = queue_of(A, B, C)
-    assert queue.begin_next() is None
     assert runner.begun == [0]
     end_trial(queue, runner)
     end_trial(queue, runner)
     assert runner.begun == [0, 1, 2]
     end_trial(queue, runner)
     assert runner.begun == [0, 1, 2]
-    assert queue.hand_over() is None
+    assert queue.collect() == []
 
 
 def test_the_running_trial_goes_on_if_it_is_leased_again() -> None:
     queue, runner = queue_of(A, B)
     queue.replace([A, C])
-    assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0], 0)
     end_trial(queue, runner)
     assert runner.begun == [0, 2]
@@ -78,7 +76,6 @@ def test_the_running_trial_goes_on_under_a_new_lease_and_is_done_once() -> None:
     queue.replace(again)
     end_trial(queue, runner)
     queue.replace(again)
-    assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0, 1], 0)
 
 
@@ -86,24 +83,20 @@ def test_a_trial_that_is_done_is_done_again_only_under_a_new_lease() -> None:
     queue, runner = queue_of(A)
     end_trial(queue, runner)
     queue.replace([replace(A, nonce="new")])
-    assert queue.begin_next() is None
     assert runner.begun == [0, 0]
 
 
 def test_the_running_trial_is_dropped_if_it_is_leased_with_other_values() -> None:
     queue, runner = queue_of(A)
     queue.replace([replace(A, values={"ball.mass_kg": 0.05})])
-    assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0, 0], 1)
 
 
 def test_the_running_trial_is_dropped_if_its_lease_is_gone() -> None:
     queue, runner = queue_of(A, B)
     queue.replace([C])
-    assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0, 2], 1)
     queue.replace([])
-    assert queue.begin_next() is None
     assert (runner.begun, runner.dropped) == ([0, 2], 2)
 
 
@@ -111,7 +104,6 @@ def test_a_late_list_of_leases_does_not_repeat_an_ended_trial() -> None:
     queue, runner = queue_of(A)
     end_trial(queue, runner)
     queue.replace([A, B])
-    assert queue.begin_next() is None
     assert runner.begun == [0, 1]
 
 
@@ -119,35 +111,21 @@ def test_a_trial_that_cannot_begin_is_refused_and_the_next_one_begins() -> None:
     runner = Runner()
     queue = LeaseQueue(runner)  # type: ignore[arg-type]
     queue.replace([BAD, A])
-    assert queue.begin_next() == TrialRefusal(BAD.trial, "out of reach")
-    assert queue.begin_next() is None
+    assert queue.collect() == [TrialRefusal(BAD.trial, "out of reach")]
     assert (runner.begun, runner.dropped) == ([0], 1)
 
 
 def test_a_trial_whose_episode_is_unusable_is_refused() -> None:
     queue, runner = queue_of(A, B)
     runner.yields = ThrowcollectError("not finite")
-    assert queue.hand_over() == TrialRefusal(A.trial, "not finite")
-    assert queue.begin_next() is None
+    assert queue.collect() == [TrialRefusal(A.trial, "not finite")]
     assert runner.begun == [0, 1]
-
-
-def test_an_episode_without_a_lease_is_handed_over_as_well() -> None:
-    queue, runner = queue_of()
-    runner.yields = "an episode"
-    assert queue.hand_over() == "an episode"
-
-
-def test_leases_that_are_cleared_are_forgotten() -> None:
-    queue, runner = queue_of(A, B)
-    queue.clear()
-    assert queue.begin_next() is None
-    assert (runner.begun, runner.dropped) == ([0], 0)
 
 
 def test_a_trial_in_which_the_engine_fails_is_dropped_and_refused() -> None:
     queue, runner = queue_of(A, B)
-    assert queue.fail(ThrowcollectError("broken")) == TrialRefusal(A.trial, "broken")
-    assert queue.begin_next() is None
+    queue.fail(ThrowcollectError("broken"))
+    assert queue.collect() == [TrialRefusal(A.trial, "broken")]
     assert (runner.begun, runner.dropped) == ([0, 1], 1)
-    assert queue_of()[0].fail(ThrowcollectError("broken")) is None
+    with pytest.raises(ThrowcollectError, match="broken"):
+        queue_of()[0].fail(ThrowcollectError("broken"))
