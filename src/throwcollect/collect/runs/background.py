@@ -208,7 +208,7 @@ def _prepare_session(run: Run, order: Order, reporter: Reporter) -> Run:
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
         reserve_port(config.run).close()
-        choice = choose(config, say=reporter.say, warn=reporter.warn)
+        choice = choose(config, reporter)
         # Containers do not see the directory.
         record = replace(run.record, recordings=str(order.output) if choice[0] == "local" else None)
         run.write(add_runtime(record, config, *choice, reporter=reporter))

@@ -114,13 +114,13 @@ class NodeCollection:
                 self._supervisor.change(roster(self._host, self._simulations))
             end, news = self._supervisor.poll()
             for line in news:
-                self._session.warn(line)
+                self._session.reporter.warn(line)
             self._session.nodes(self._supervisor.states(), endpoint=self._host.endpoint, simulations=self._simulations)
         if end is None:
             self._session.event("stopping")
             if not self._host.record.collects:
                 return None
-            self._session.say("interrupted: finishing the running trials; once more ends at once")
+            self._session.reporter.say("interrupted: finishing the running trials; once more ends at once")
             end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
         # While this process waited for the end of the coordinator, its last report may have arrived.
         self._listen()
@@ -160,7 +160,7 @@ class NodeCollection:
             self._started_again = True
             # The new nodes get the same time to meet, from the first report of the new coordinator on.
             self._apart_since = math.inf
-            self._session.warn("the coordinator does not see the simulations; all of them are started again")
+            self._session.reporter.warn("the coordinator does not see the simulations; all of them are started again")
             self._supervisor.replace([state.name for state in states if state.name != ROUTER])
         else:
             raise WorkerError(
