@@ -32,7 +32,6 @@ from throwcollect.wording import command, format_count
 
 _SYNC_EVERY_S = 1.0
 """Real time after which data is forced to the disk: a power cut costs what was collected in this time at most."""
-_REPORT_EVERY_S = 2.0
 _REPLAY_AHEAD_S = 3.0
 """How long before the expected end of the last trial the process starts that simulates some trials again."""
 
@@ -86,19 +85,13 @@ class TrialCollection:
     def open(cls, directory: Path, *, say: Callable[[str], object], processes: int = 1) -> TrialCollection:
         """Open a dataset to collect into, as `prepare` or `resume` left it, and count what is there already as done.
 
-        `say` is called with how many episodes were found, and before that with how far the search has come, if it takes
-        long; `processes` is as `DatasetWriter.recover` takes it.
+        `say` is called with how many episodes were found; `processes` is as `DatasetWriter.recover` takes it.
         """
         collection = cls(DatasetWriter.open(directory), directory)
         count = 0
-        reported_s = time.monotonic()
 
         def count_episode(trial: int, result: Result) -> bool:
-            nonlocal count, reported_s
-            # Episodes come file by file, so this is the number in all files that were read so far.
-            if count and time.monotonic() >= reported_s + _REPORT_EVERY_S:
-                reported_s = time.monotonic()
-                say(f"has found {format_count(count, 'episode')} of an earlier collection so far")
+            nonlocal count
             count += 1
             return collection.recall(trial, result)
 
