@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -20,7 +20,6 @@ from throwcollect.collect.coordinator.progress import Progress, TrialRate
 from throwcollect.collect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.summary import explain_loss
-from throwcollect.dataset.throws_table import Row
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
@@ -72,7 +71,6 @@ class TrialCollection:
         self._prefetch = Prefetch()
         self._agreed: set[str] = set()
         """Simulations that have handed over an episode whose motion was compared with that of the plan."""
-        self._backlog: deque[tuple[Episode, Row]] = deque()
         self._outcomes: Counter[str] = Counter()
         self._rate = TrialRate()
         self._draining = False
@@ -111,15 +109,8 @@ class TrialCollection:
         self.writer.close()
 
     @property
-    def backlog(self) -> int:
-        """Number of episodes that have arrived but are not written yet."""
-        return len(self._backlog)
-
-    @property
     def finished(self) -> bool:
-        """Whether all trials have ended and are written; while draining, whether running ones did, or time is up."""
-        if self._backlog:
-            return False
+        """Whether all trials have ended; while draining, whether running ones did, or time is up."""
         return self.complete or (
             self._draining and (self._leases.leased == 0 or time.monotonic() > self._drain_deadline)
         )
@@ -198,12 +189,12 @@ class TrialCollection:
         return held
 
     def take_in(self, simulation: str, episode: Episode) -> bool:
-        """Take in an episode, which `write_one` writes later; refuse one that is not what the plan asks for.
+        """Write an episode; refuse one that is not what the plan asks for.
 
         The first episode of a trial counts, even if another simulation holds it by now, and further ones are dropped.
 
         Returns:
-            Whether it was taken in.
+            Whether it was written.
         """
         trial = episode.header.trial
         if not self._leases.is_open(trial):
@@ -219,7 +210,8 @@ class TrialCollection:
         self._agreed.add(simulation)
         self._prefetch.end(simulation)
         self._leases.complete(simulation, trial)
-        self._backlog.append((episode, result))
+        self.writer.append(episode, result)
+        self._note(trial, result["outcome"])
         return True
 
     def refuse(self, simulation: str, trial: int, reason: str) -> None:
@@ -238,12 +230,6 @@ class TrialCollection:
         for trial in self._leases.find_held(simulation):
             given_up = self._leases.fail(simulation, trial, reason, refused=refused, alive=alive)
             self._give_back(simulation, trial, reason, given_up)
-
-    def write_one(self) -> None:
-        """Write the oldest episode of the backlog."""
-        episode, result = self._backlog.popleft()
-        self.writer.append(episode, result)
-        self._note(episode.header.trial, result["outcome"])
 
     def check_next(self) -> bool:
         """Check whether the robot can do the next trial of the plan, which takes some milliseconds.

@@ -18,8 +18,8 @@ class Progress:
 
     Attributes:
         total: Number of trials to run; with `wanted`, of those that are known so far.
-        ended: Number of trials that have ended, whether they are written yet or not.
-        outcomes: Number of written trials of each outcome.
+        ended: Number of trials that have ended.
+        outcomes: Number of trials of each outcome.
         simulations: Number of simulations in the ROS graph.
         throws_per_s: Trials that ended per second of the last ten seconds.
         hung: Names of the simulations that took too long for a trial and have not been heard of since.

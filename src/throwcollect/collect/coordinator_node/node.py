@@ -234,11 +234,7 @@ def _collect(
         heartbeat.beat()
         if stopped():
             collection.drain()
-        # What has arrived is written before more is taken in and leased. So simulations that are faster than this
-        # process wait for it, and their episodes do not pile up here.
         ros.spin_some(executor, timeout_sec=0.0 if collection.check_next() else _IDLE_S)
-        while collection.backlog:
-            collection.write_one()
         collection.look_after()
         if node.sees_simulations:
             seen = time.monotonic()

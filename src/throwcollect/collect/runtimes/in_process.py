@@ -103,8 +103,6 @@ class InProcess:
                     collection.take_in(_SIMULATION, episode)
             else:
                 collection.check_next()
-            if collection.backlog:
-                collection.write_one()
             collection.look_after()
             session.nodes(states, endpoint=None, simulations=1)
             if time.monotonic() >= self._reported_at + _REPORT_EVERY_S:
