@@ -63,7 +63,6 @@ def _take_in(messages: list[bytes], plan: Plan, directory: Path) -> float:
             assert isinstance(episode, Episode)
             if not collection.take_in("/sim_0", episode):
                 raise ValueError(f"trial {episode.header.trial} is refused")
-            collection.write_one()
         return len(messages) / (time.perf_counter() - began)
 
 

@@ -107,22 +107,9 @@ _PLACES = {
 
 
 def __getattr__(name: str) -> object:
-    """Import the object with a public name.
+    from throwcollect.extras import import_public
 
-    Raises:
-        AttributeError: If there is no such name.
-        MissingExtraError: If the object needs an extra that is not installed.
-    """
-    if name not in _PLACES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    from throwcollect.extras import explain_missing
-
-    module, _, attribute = _PLACES[name].partition(":")
-    with explain_missing():
-        found = import_module(f"{__name__}.{module}")
-    return getattr(found, attribute) if attribute else found
+    return import_public(__name__, _PLACES, name)
 
 
 def __dir__() -> list[str]:

@@ -9,7 +9,7 @@ module that is useful even without the package imports it through `lazily`.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -129,6 +129,21 @@ def explain_missing() -> Iterator[None]:
         if package not in EXTRA_OF:
             raise
         raise MissingExtraError(package) from error
+
+
+def import_public(module: str, places: Mapping[str, str], name: str) -> Any:
+    """Import the object with a public name of a module, from its place below `throwcollect`: module and attribute.
+
+    Raises:
+        AttributeError: If there is no such name.
+        MissingExtraError: If the object needs an extra that is not installed.
+    """
+    if name not in places:
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+    inside, _, attribute = places[name].partition(":")
+    with explain_missing():
+        found = import_module(f"throwcollect.{inside}")
+    return getattr(found, attribute) if attribute else found
 
 
 def lazily(name: str) -> Any:

@@ -90,7 +90,7 @@ def limited(slurm: Slurm, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     directory = tmp_path_factory.mktemp("limited")
     config = configure(directory, trials=45, shards=3)
     apart = f'cluster.lines=["#SBATCH --nodelist={slurm.nodes[-1]}"]'
-    array = submit(slurm, config, directory / "data", apart, "cluster.time=2", "sim.real_time_factor=0.5", tasks=2)
+    array = submit(slurm, config, directory / "data", apart, "cluster.time=2:00", "sim.real_time_factor=0.5", tasks=2)
     yield directory / "data", recordings(collect_whole(config, directory / "whole"))
     slurm.run("scancel", "--quiet", array)
 
@@ -204,13 +204,13 @@ def test_the_file_of_the_site_gives_defaults_for_cluster_keys(
 ) -> None:
     site = tmp_path / "throwcollect" / "cluster.yaml"
     site.parent.mkdir()
-    site.write_text("partition: low\ntime: 30\n")
+    site.write_text("partition: low\ntime: 0:30:00\n")
     arguments = ("submit", short[0], "--output", tmp_path / "data", "--tasks", str(TASKS), "--dry-run", "--set")
-    said = call(slurm, *arguments, "cluster.time=10", XDG_CONFIG_HOME=str(tmp_path))
+    said = call(slurm, *arguments, "cluster.time=0:10:00", XDG_CONFIG_HOME=str(tmp_path))
     assert "#SBATCH --partition=low" in said
-    assert "#SBATCH --time=10" in said
+    assert "#SBATCH --time=0:10:00" in said
     site.write_text("partition: low\ntiem: 30\n")
-    said = call(slurm, *arguments, "cluster.time=10", expect=2, XDG_CONFIG_HOME=str(tmp_path))
+    said = call(slurm, *arguments, "cluster.time=0:10:00", expect=2, XDG_CONFIG_HOME=str(tmp_path))
     assert "cluster.yaml:2: tiem: unknown key" in said
 
 

@@ -106,17 +106,18 @@ def logs(nodes: list[str] | None = None, *, follow: bool = False, run: RunOption
     from throwcollect.collect.runs.following import read_logs
     from throwcollect.collect.runs.run_selection import find_run_to_watch
 
-    for name, line, width in read_logs(find_run_to_watch(run), nodes or (), follow=follow, keep_on=has_reader):
+    for name, line, width in read_logs(find_run_to_watch(run), nodes or (), until_end=follow, keep_on=has_reader):
         typer.echo(f"{name:{width}} | {line}")
 
 
 def events(run: RunOption = None, json: JsonOption = False) -> None:
     """Print what happens in a run, from its start until it ends: nodes started, ready, lost and so on."""
-    from throwcollect.collect.runs.following import read_events
+    from throwcollect.collect.runs.following import follow
     from throwcollect.collect.runs.run_selection import find_run_to_watch
 
-    for event, line in read_events(find_run_to_watch(run), keep_on=has_reader):
-        typer.echo(line if json else f"{event.time}  {event}")
+    for update in follow(find_run_to_watch(run), keep_on=has_reader, from_start=True):
+        for event in update.events:
+            typer.echo(event.to_json() if json else f"{event.time}  {event}")
 
 
 def scale(simulations: int, *, run: RunOption = None) -> None:

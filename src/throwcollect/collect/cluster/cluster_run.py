@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from pathlib import Path
 from throwcollect.collect.cluster import slurm
 from throwcollect.collect.cluster.slurm import ArrayTask
 from throwcollect.collect.cluster.submission import CLUSTER, LOGS, Submission, read_submission
-from throwcollect.collect.coordinator.progress import Progress
+from throwcollect.collect.coordinator.progress import Progress, TrialRate
 from throwcollect.config.schema import Config
 from throwcollect.dataset.configuration import read_config
 from throwcollect.dataset.directory import METADATA, PLAN, THROWS
@@ -77,9 +78,7 @@ class ClusterRun:
         if not missing:
             hint = f"{command('join', self.directory)} joins them"
             return WorkerError("all slices are finished, but they are not joined", hint=hint)
-        ended: dict[int | None, ArrayTask] = {}
-        for job in self.submission.jobs:
-            ended |= slurm.find_ended(job.array) if job.array else {}
+        ended = {task.index: task for task in look.tasks if not task.lives}
         reasons = [self._explain_slice(each, ended.get(each.index)) for each in missing[:_MOST_NAMED]]
         more = f" and {len(missing) - _MOST_NAMED} more" if len(missing) > _MOST_NAMED else ""
         message = f"{format_count(len(missing), 'slice')} of {self.submission.tasks} not collected: "
@@ -108,7 +107,7 @@ class ClusterRun:
             return f"{slice.index}"
         if task.saw_no_directory:
             return f"{slice.index} (node {task.node} does not see {self.directory})"
-        return f"{slice.index} ({task.state}, exit code {task.reason}, node {task.node or '-'})"
+        return f"{slice.index} ({task.state}, {task.reason}, node {task.node or '-'})"
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ class ProgressOfSlices:
 
     def __init__(self, run: ClusterRun) -> None:
         self._run = run
-        self._first: tuple[float, int] | None = None
+        self._rate: TrialRate | None = None
         self._outcomes: Counter[str] = Counter()
         self._read: set[Slice] = set()
 
@@ -165,23 +164,18 @@ class ProgressOfSlices:
                     continue  # a join moves the files of slices
                 self._read.add(each)
         task, ended = self._run.config.task, self._outcomes.total()
+        self._rate = self._rate or TrialRate(ended, window_s=math.inf)
+        self._rate.note(ended)
         return Progress(
             total=self._run.trials,
             ended=ended,
             outcomes=dict(self._outcomes),
             simulations=look.running * self._run.config.cluster.cores,
-            throws_per_s=self._measure_speed(ended),
+            throws_per_s=self._rate.per_s,
             hung=[],
             success=task.success,
             noun=task.noun,
         )
-
-    def _measure_speed(self, ended: int) -> float:
-        now = time.monotonic()
-        if self._first is None:
-            self._first = now, ended
-        began, before = self._first
-        return max(0, ended - before) / (now - began) if now > began else 0.0
 
 
 def _count_outcomes(directory: Path) -> Counter[str]:

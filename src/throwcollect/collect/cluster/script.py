@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from throwcollect.config.schema import Config
-from throwcollect.dataset.directory import PLAN
 from throwcollect.errors import Interrupted
 
 _ENDING_S = 30
@@ -117,12 +116,6 @@ class BatchScripts:
     def _list_opening_lines(self) -> Iterator[str]:
         yield from self.config.cluster.lines
         yield from (f"module load {shlex.quote(module)}" for module in self.config.cluster.modules)
-        plan = shlex.quote(str(self.directory / PLAN))
-        yield f"if ! [ -r {plan} ]; then"
-        question = "is it on a file system that all nodes share?"
-        yield f'    echo "throwcollect: $(hostname) does not see" {plan}": {question}" >&2'
-        yield "    exit 2"
-        yield "fi"
 
     def _write_step(self, words: Sequence[str], *, cores: int) -> str:
         return f"srun --ntasks=1 --cpus-per-task={cores} {self._write_command(words)}"

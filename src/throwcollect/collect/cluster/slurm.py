@@ -20,8 +20,8 @@ _ENDED = re.compile(
     "BOOT_FAIL|CANCELLED|COMPLETED|DEADLINE|FAILED|NODE_FAIL|OUT_OF_MEMORY|PREEMPTED|REVOKED|TIMEOUT",
 )
 """States of tasks that have ended. All others, including those of future versions of Slurm, count as living."""
-_UNSEEN_OUTPUT = "0:53"
-"""Exit code of a task whose log could not be opened: its node does not see the directory."""
+_UNSEEN_OUTPUT = ("JobLaunchFailure", "RaisedSignal:53")
+"""Beginnings of the reason of a task whose log could not be opened: its node does not see the directory."""
 _UNREACHED = ("Could not establish a configuration source", "Unable to contact slurm controller")
 """Parts of the messages of Slurm's commands if there is no controller, or it cannot be reached."""
 
@@ -34,7 +34,7 @@ class ArrayTask:
         index: Its index in the array; None for a job that is no array.
         state: Its state in the words of Slurm, such as ``PENDING`` or ``RUNNING``.
         node: The node that it runs or ran on; empty if none.
-        reason: The reason why it waits, or its exit code, in the words of Slurm.
+        reason: The reason why it waits, or has ended, in the words of Slurm.
     """
 
     index: int | None
@@ -55,7 +55,7 @@ class ArrayTask:
     @property
     def saw_no_directory(self) -> bool:
         """Whether it ended before its first line, because its node does not see the directory of its log."""
-        return self.state == "FAILED" and self.reason == _UNSEEN_OUTPUT
+        return self.state == "FAILED" and self.reason.startswith(_UNSEEN_OUTPUT)
 
 
 def submit(script: Path, *options: str) -> str:
@@ -80,60 +80,13 @@ def find_tasks() -> dict[str, list[ArrayTask]]:
     found: dict[str, list[ArrayTask]] = {}
     for line in _run("squeue", "--noheader", "--array", "--me", "--states=all", f"--format={format_}").splitlines():
         job, index, state, node, reason = line.strip().split("|")
-        found.setdefault(job, []).append(ArrayTask(_read_index(index), state, node, reason))
-    return found
-
-
-def find_ended(job: str) -> dict[int | None, ArrayTask]:
-    """Find the tasks of a job that have ended, by index, in the accounting or in the memory of the controller."""
-    ended: dict[int | None, ArrayTask] = {}
-    try:
-        text = _run("scontrol", "--oneliner", "show", "job", job)
-    except WorkerError:
-        text = ""
-    for line in text.splitlines():
-        facts = dict(word.split("=", 1) for word in line.split() if "=" in word)
-        for index in _read_indexes(facts.get("ArrayTaskId", "")):
-            task = ArrayTask(index, facts["JobState"], facts.get("NodeList", ""), facts["ExitCode"])
-            if not task.lives:
-                ended[index] = task
-    return ended | _find_accounted(job)
-
-
-def _find_accounted(job: str) -> dict[int | None, ArrayTask]:
-    try:
-        text = _run(
-            "sacct", "--noheader", "--parsable2", "-X", f"--jobs={job}", "--format=JobID,State,NodeList,ExitCode"
-        )
-    except (WorkerError, ConfigError):
-        return {}  # many clusters have no accounting
-    found = {}
-    for line in text.splitlines():
-        name, state, node, code = line.split("|")
-        # A task is called ARRAY_INDEX, and a cancelled one has the state `CANCELLED by UID`.
-        task = ArrayTask(_read_index(name.partition("_")[2]), state.partition(" ")[0], node, code)
-        if not task.lives:
-            found[task.index] = task
+        found.setdefault(job, []).append(ArrayTask(int(index) if index.isdigit() else None, state, node, reason))
     return found
 
 
 def cancel(jobs: Sequence[str]) -> None:
     """End jobs; those that have ended stay as they are."""
     _run("scancel", "--quiet", *jobs)
-
-
-def _read_indexes(text: str) -> list[int | None]:
-    """Read the indexes of array tasks, such as ``4``, ``4-7%2`` or ``1,4-7``; ``[None]`` for a job that is no array."""
-    found: list[int | None] = []
-    for part in text.partition("%")[0].split(","):
-        first, _, last = part.partition("-")
-        if first.isdigit():
-            found += range(int(first), int(last if last.isdigit() else first) + 1)
-    return found or [None]
-
-
-def _read_index(text: str) -> int | None:
-    return int(text) if text.isdigit() else None
 
 
 def _run(program: str, *arguments: str) -> str:
@@ -147,7 +100,7 @@ def _run(program: str, *arguments: str) -> str:
             timeout=_PATIENCE_S,
             check=False,
             # These variables and the locale of the user would change the format of its output.
-            env={**{k: v for k, v in os.environ.items() if not k.startswith(("SQUEUE_", "SACCT_"))}, "LC_ALL": "C"},
+            env={**{k: v for k, v in os.environ.items() if not k.startswith("SQUEUE_")}, "LC_ALL": "C"},
         )
     except FileNotFoundError as error:
         raise ConfigError(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -20,7 +20,6 @@ from throwcollect.collect.coordinator.progress import Progress, TrialRate
 from throwcollect.collect.coordinator.replay_check import ReplayCheck
 from throwcollect.dataset.directory import find_known_directory
 from throwcollect.dataset.summary import explain_loss
-from throwcollect.dataset.throws_table import Row
 from throwcollect.dataset.writer import DatasetWriter
 from throwcollect.episode.episode_message import Episode
 from throwcollect.errors import DatasetError, Interrupted, WorkerError
@@ -32,7 +31,6 @@ from throwcollect.wording import command, format_count
 
 _SYNC_EVERY_S = 1.0
 """Real time after which data is forced to the disk: a power cut costs what was collected in this time at most."""
-_REPORT_EVERY_S = 2.0
 _REPLAY_AHEAD_S = 3.0
 """How long before the expected end of the last trial the process starts that simulates some trials again."""
 
@@ -64,6 +62,8 @@ class TrialCollection:
         checked = (number for number in trials.numbers_to_run if number < self._next_to_check)
         self._leases = Leases(checked, retries=self._config.run.retries)
         self._names: dict[str, str] = {}
+        self._left: dict[str, int] = {}
+        """Trials that simulations held when they went out of sight; they count as failed only if these had ended."""
         self._took_part: set[str] = set()
         self._settings = Settings(self._config)
         task = task_of(self._config)
@@ -71,7 +71,6 @@ class TrialCollection:
         self._prefetch = Prefetch()
         self._agreed: set[str] = set()
         """Simulations that have handed over an episode whose motion was compared with that of the plan."""
-        self._backlog: deque[tuple[Episode, Row]] = deque()
         self._outcomes: Counter[str] = Counter()
         self._rate = TrialRate()
         self._draining = False
@@ -84,19 +83,13 @@ class TrialCollection:
     def open(cls, directory: Path, *, say: Callable[[str], object], processes: int = 1) -> TrialCollection:
         """Open a dataset to collect into, as `prepare` or `resume` left it, and count what is there already as done.
 
-        `say` is called with how many episodes were found, and before that with how far the search has come, if it takes
-        long; `processes` is as `DatasetWriter.recover` takes it.
+        `say` is called with how many episodes were found; `processes` is as `DatasetWriter.recover` takes it.
         """
         collection = cls(DatasetWriter.open(directory), directory)
         count = 0
-        reported_s = time.monotonic()
 
         def count_episode(trial: int, result: Result) -> bool:
-            nonlocal count, reported_s
-            # Episodes come file by file, so this is the number in all files that were read so far.
-            if count and time.monotonic() >= reported_s + _REPORT_EVERY_S:
-                reported_s = time.monotonic()
-                say(f"has found {format_count(count, 'episode')} of an earlier collection so far")
+            nonlocal count
             count += 1
             return collection.recall(trial, result)
 
@@ -116,15 +109,8 @@ class TrialCollection:
         self.writer.close()
 
     @property
-    def backlog(self) -> int:
-        """Number of episodes that have arrived but are not written yet."""
-        return len(self._backlog)
-
-    @property
     def finished(self) -> bool:
-        """Whether all trials have ended and are written; while draining, whether running ones did, or time is up."""
-        if self._backlog:
-            return False
+        """Whether all trials have ended; while draining, whether running ones did, or time is up."""
         return self.complete or (
             self._draining and (self._leases.leased == 0 or time.monotonic() > self._drain_deadline)
         )
@@ -163,23 +149,26 @@ class TrialCollection:
         self._rate = TrialRate(self._leases.ended)
         return True
 
-    def join(self, simulation: str, name: str) -> None:
-        """Note the address of a simulation that can be given trials, and the name of its node."""
+    def join(self, simulation: str, name: str, *, replaced: bool = False) -> None:
+        """Note the address of a simulation that can be given trials, and the name of its node.
+
+        If it has `replaced` one that has left, that one had ended, and has failed with the trial that it held.
+        """
+        trial = self._left.pop(simulation, None)
+        if replaced and trial is not None and (reasons := self._leases.blame(simulation, trial)) is not None:
+            self._lose(trial, reasons)
         self._names[simulation] = name
         self._took_part.add(name)
 
     def leave(self, simulation: str, reason: str) -> None:
-        """Forget a simulation that is out of sight, and take its trials back; call `settle` when its fate is known."""
-        self.take_back(simulation, reason, alive=None)
+        """Forget a simulation that is out of sight, and take its trials back; it may come back alive."""
+        if held := self._leases.find_held(simulation):
+            self._left[simulation] = held[0]
+        self.take_back(simulation, reason, alive=True)
         self._leases.forget(simulation)
         self._prefetch.forget(simulation)
         self._agreed.discard(simulation)
         del self._names[simulation]
-
-    def settle(self, simulation: str, *, alive: bool) -> None:
-        """Note what became of a simulation that has left: only if it was not alive has it failed with its trial."""
-        if (given_up := self._leases.settle(simulation, alive=alive)) is not None:
-            self._lose(*given_up)
 
     def lease(self, simulation: str) -> tuple[int, ...]:
         """Give further trials to a simulation that has few, and return all trials that it has to do, in order."""
@@ -195,17 +184,17 @@ class TrialCollection:
         if not held:
             self._prefetch.begin(simulation)
         while len(held) < count and (trial := self._leases.lease(simulation, others=self._names)) is not None:
-            self.writer.note("lease", trial=trial, simulation=self.name_of(simulation))
+            self.writer.note("lease", trial=trial, simulation=self._names[simulation])
             held = (*held, trial)
         return held
 
     def take_in(self, simulation: str, episode: Episode) -> bool:
-        """Take in an episode, which `write_one` writes later; refuse one that is not what the plan asks for.
+        """Write an episode; refuse one that is not what the plan asks for.
 
         The first episode of a trial counts, even if another simulation holds it by now, and further ones are dropped.
 
         Returns:
-            Whether it was taken in.
+            Whether it was written.
         """
         trial = episode.header.trial
         if not self._leases.is_open(trial):
@@ -221,7 +210,8 @@ class TrialCollection:
         self._agreed.add(simulation)
         self._prefetch.end(simulation)
         self._leases.complete(simulation, trial)
-        self._backlog.append((episode, result))
+        self.writer.append(episode, result)
+        self._note(trial, result["outcome"])
         return True
 
     def refuse(self, simulation: str, trial: int, reason: str) -> None:
@@ -230,22 +220,16 @@ class TrialCollection:
             return
         self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=True))
 
-    def take_back(self, simulation: str, reason: str, *, refused: bool = False, alive: bool | None = False) -> None:
+    def take_back(self, simulation: str, reason: str, *, refused: bool = False, alive: bool = False) -> None:
         """Take all trials back from a simulation, which failed with the first and had not begun the others.
 
         The reason is kept as evidence. With `refused`, the simulation refused the trials, and may refuse all others.
-        If it is `alive`, this does not count; None if only a later call of `settle` decides it.
+        If it is `alive`, this does not count.
         """
         self._leases.release(simulation)
         for trial in self._leases.find_held(simulation):
             given_up = self._leases.fail(simulation, trial, reason, refused=refused, alive=alive)
             self._give_back(simulation, trial, reason, given_up)
-
-    def write_one(self) -> None:
-        """Write the oldest episode of the backlog."""
-        episode, result = self._backlog.popleft()
-        self.writer.append(episode, result)
-        self._note(episode.header.trial, result["outcome"])
 
     def check_next(self) -> bool:
         """Check whether the robot can do the next trial of the plan, which takes some milliseconds.
@@ -281,15 +265,18 @@ class TrialCollection:
         if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate.per_s:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
-    def progress(self, hung: Iterable[str] = ()) -> Progress:
-        """Report how far the collection has come; `hung` names the simulations that took too long for a trial."""
+    def progress(self, hung: Iterable[str] = (), *, unreached: int = 0) -> Progress:
+        """Report how far the collection has come.
+
+        `hung` names the simulations that took too long for a trial; `unreached` is how many cannot be asked (yet).
+        """
         ended = self._leases.ended
         self._rate.note(ended)
         return Progress(
             total=self._leases.total,
             ended=ended,
             outcomes=dict(self._outcomes),
-            simulations=len(self._names),
+            simulations=len(self._names) - unreached,
             throws_per_s=self._rate.per_s,
             hung=sorted(hung),
             wanted=self._config.until.wanted if self._config.until else None,
@@ -318,11 +305,6 @@ class TrialCollection:
         if lost is not None:
             raise lost
 
-    def name_of(self, simulation: str) -> str:
-        """Find the name of a simulation's node, even after the simulation has left."""
-        # By default, a simulation lives in a namespace that has the name of its node.
-        return self._names.get(simulation, simulation.strip("/"))
-
     def _note(self, trial: int, outcome: str) -> None:
         self._outcomes[outcome] += 1
         self._prefix.end(trial, succeeded=outcome == self._config.task.success)
@@ -343,7 +325,7 @@ class TrialCollection:
         """Report a trial that is tried again, by another simulation if there is one, or record it as lost."""
         fate = "is tried again" if given_up is None else "is lost"
         self.warn(f"{simulation}: trial {trial} {fate}: {reason}")
-        self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
+        self.writer.note("fail", trial=trial, simulation=self._names[simulation], reason=reason)
         if given_up is not None:
             self._lose(trial, given_up)
 

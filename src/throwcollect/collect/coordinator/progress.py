@@ -11,9 +11,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from throwcollect.wording import format_count
 
-_WINDOW_S = 10.0
-"""Trials per second are averaged over this time."""
-
 
 @dataclass(frozen=True)
 class Progress:
@@ -21,8 +18,8 @@ class Progress:
 
     Attributes:
         total: Number of trials to run; with `wanted`, of those that are known so far.
-        ended: Number of trials that have ended, whether they are written yet or not.
-        outcomes: Number of written trials of each outcome.
+        ended: Number of trials that have ended.
+        outcomes: Number of trials of each outcome.
         simulations: Number of simulations in the ROS graph.
         throws_per_s: Trials that ended per second of the last ten seconds.
         hung: Names of the simulations that took too long for a trial and have not been heard of since.
@@ -99,9 +96,10 @@ _PROGRESS = TypeAdapter(Progress)
 
 
 class TrialRate:
-    """Trials that ended per second of real time, over the last ten seconds; the first `ended` trials do not count."""
+    """Trials that ended per second of real time, over a time until now; the first `ended` trials do not count."""
 
-    def __init__(self, ended: int = 0) -> None:
+    def __init__(self, ended: int = 0, *, window_s: float = 10.0) -> None:
+        self._window_s = window_s
         # Pairs of a time and the number of trials that had ended by then. One pair is there from the start, so that a
         # rate can be taken from the first call of `note` on.
         self._ends = deque([(time.monotonic(), ended)])
@@ -116,5 +114,5 @@ class TrialRate:
         """Note the number of trials that have ended by now."""
         now = time.monotonic()
         self._ends.append((now, ended))
-        while self._ends[0][0] < now - _WINDOW_S:
+        while self._ends[0][0] < now - self._window_s:
             self._ends.popleft()

@@ -36,21 +36,9 @@ else:
     __all__ = list(_PLACES)
 
     def __getattr__(name: str) -> object:
-        """Import the object with a public name.
+        from throwcollect.extras import import_public
 
-        Raises:
-            AttributeError: If there is no such name.
-            MissingExtraError: If the object needs an extra that is not installed.
-        """
-        from importlib import import_module
-
-        from throwcollect.extras import explain_missing
-
-        if name not in _PLACES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        module, name = _PLACES[name].split(":")
-        with explain_missing():
-            return getattr(import_module(f"throwcollect.{module}"), name)
+        return import_public(__name__, _PLACES, name)
 
     def __dir__() -> list[str]:
         return sorted({*globals(), *__all__})

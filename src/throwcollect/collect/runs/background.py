@@ -26,14 +26,13 @@ from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runtimes.node_logs import NodeLogs
 from throwcollect.collect.runtimes.nodes import LAUNCHER
 from throwcollect.collect.runtimes.run_record import Kind, Origin, RunFailure, RunRecord
-from throwcollect.collect.runtimes.runtime import choose, get_runtime
+from throwcollect.collect.runtimes.runtime import choose
 from throwcollect.config.loader import load, load_locating_errors
 from throwcollect.config.run import ContainerSpec
-from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
 from throwcollect.dataset.carried_robot import write_config
 from throwcollect.dataset.directory import config_path
-from throwcollect.errors import ConfigError, Interrupted, Problem, ThrowcollectError, WorkerError
+from throwcollect.errors import Interrupted, ThrowcollectError, WorkerError
 from throwcollect.files import open_log
 from throwcollect.own_process import stop_signals
 from throwcollect.ros.router_endpoint import reserve_port
@@ -76,8 +75,6 @@ def begin_run(
         resumed: Whether the run continues the dataset that the directory holds.
     """
     read = load(config, overrides)
-    if kind == "session":
-        _check_session(read)
     made = Records().new(read.name, run=run)
     directory = made.files / "data" if kind == "session" else output
     record = made.begin(read.name, directory, kind=kind, origin=origin, domain_id=read.run.domain_id)
@@ -208,17 +205,9 @@ def _prepare_session(run: Run, order: Order, reporter: Reporter) -> Run:
         directory.mkdir(exist_ok=True)
         write_config(directory, config)
         reserve_port(config.run).close()
-        choice = choose(config, say=reporter.say, warn=reporter.warn)
+        choice = choose(config, reporter)
         # Containers do not see the directory.
         record = replace(run.record, recordings=str(order.output) if choice[0] == "local" else None)
         run.write(add_runtime(record, config, *choice, reporter=reporter))
         launching = partial(launch, config=config, reporter=reporter)
         return run.prepared(config, directory, launching, held=ExitStack(), undo=ExitStack())
-
-
-def _check_session(config: Config) -> None:
-    """Check that a session has nodes to which its clients can talk."""
-    if config.run.runtime != "auto" and not get_runtime(config.run.runtime).can_be_scaled:
-        raise ConfigError(
-            [Problem(f"should have nodes for clients to talk to, got {config.run.runtime}", key="run.runtime")]
-        )

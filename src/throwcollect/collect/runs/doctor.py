@@ -32,9 +32,6 @@ from throwcollect.state_directory import state_directory
 from throwcollect.wording import format_count, join_names
 
 _GIB = 1024**3
-_SIMULATION_MEMORY_GIB = 0.3
-"""Upper limit of the resident memory of one simulation."""
-
 _LEAST_DISK_GIB = 1.0
 _DIGITS = 10
 
@@ -46,14 +43,9 @@ def _check_python() -> Check:
     return Check("python", "ok", found)
 
 
-def _check_machine() -> Iterator[Check]:
+def _check_cores() -> Check:
     cores = len(os.sched_getaffinity(0))
-    yield Check("cores", "ok", f"{cores}; up to {format_count(cores, 'simulation')} side by side (`-n {cores}`)")
-    lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-    available = next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")) * 1024 / _GIB
-    room = int(available / _SIMULATION_MEMORY_GIB)
-    found = f"{available:.1f} GiB available, enough for {format_count(room, 'simulation')}"
-    yield Check("memory", "ok" if room >= 1 else "problem", found)
+    return Check("cores", "ok", f"{cores}; up to {format_count(cores, 'simulation')} side by side (`-n {cores}`)")
 
 
 def _check_engine(name: str) -> Check:
@@ -148,7 +140,7 @@ def examine(directory: Path) -> list[Check]:
     return [
         _check_python(),
         _check_extras(),
-        *_check_machine(),
+        _check_cores(),
         *map(_check_engine, ENGINE_PACKAGES),
         *map(_check_robot, names_of("robots")),
         _check_rclpy(),

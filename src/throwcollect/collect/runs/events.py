@@ -47,6 +47,10 @@ class Event:
         """Whether a terminal that follows the run should show the event: a node was lost or is frozen."""
         return self.node is not None and self.event in _ALARMING
 
+    def to_json(self) -> str:
+        """Write the event as a line of its file, without the fields that it lacks."""
+        return json.dumps({key: value for key, value in asdict(self).items() if value is not None})
+
     def __str__(self) -> str:
         """The event in words, for people."""
         details = [self.reason.partition("\n")[0] if self.reason else None]
@@ -59,9 +63,8 @@ class Event:
 def append_events(logs: Path, events: Sequence[Event]) -> None:
     """Append events to the file in a directory of logs, which is made if need be."""
     if events:
-        documents = ({key: value for key, value in asdict(event).items() if value is not None} for event in events)
         with open(open_log(logs / EVENTS), "a", encoding="utf-8") as file:
-            file.write("".join(f"{json.dumps(document)}\n" for document in documents))
+            file.write("".join(f"{event.to_json()}\n" for event in events))
 
 
 def compare_states(run: str, before: Sequence[NodeState], after: Sequence[NodeState]) -> list[Event]:

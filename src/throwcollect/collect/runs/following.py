@@ -32,24 +32,25 @@ class RunUpdate:
     events: tuple[Event, ...] = ()
 
 
-def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[RunUpdate]:
+def follow(run: Run, *, keep_on: Callable[[], bool] = lambda: True, from_start: bool = False) -> Iterator[RunUpdate]:
     """Look at a run several times a second until it ends, or `keep_on` returns false.
 
-    A program may follow several runs at once.
+    A program may follow several runs at once. With `from_start`, the first update has the events until now.
 
     Yields:
         An update; the last one shows a run that has ended or died, unless `keep_on` returned false.
     """
     events = Tail(run.record.logs / EVENTS)
-    events.skip()
-    yield RunUpdate(run)
+    if not from_start:
+        events.skip()
+    yield RunUpdate(run, events=_read_new_events(events, run))
     while run.status == "running" and keep_on():
         time.sleep(_READ_S)
         known = run.record.progress
         # The launcher writes events before the record, so the last record is read before the last events.
         run = run.now()
-        happened = tuple(event for event, _ in _read_new_events(events, run))
-        yield RunUpdate(run, run.record.progress if run.record.progress != known else None, happened)
+        progress = run.record.progress if run.record.progress != known else None
+        yield RunUpdate(run, progress, _read_new_events(events, run))
 
 
 def wait(run: Run) -> Info:
@@ -68,11 +69,11 @@ def wait(run: Run) -> Info:
 
 
 def read_logs(
-    run: Run, nodes: Collection[str], *, follow: bool, keep_on: Callable[[], bool] = lambda: True
+    run: Run, nodes: Collection[str], *, until_end: bool, keep_on: Callable[[], bool] = lambda: True
 ) -> Iterator[tuple[str, str, int]]:
     """Read the logs of these nodes of a run; of all nodes if none is named.
 
-    With `follow`, this function goes on with new lines until the run ends, or `keep_on` returns false.
+    With `until_end`, this function goes on with new lines until the run ends, or `keep_on` returns false.
 
     Yields:
         The name of a node, a line that it printed, and the length of the longest name so far.
@@ -82,46 +83,26 @@ def read_logs(
     if unknown := [node for node in nodes if node not in known]:
         raise ConfigError(f"run {run.id}: no node {unknown[0]!r} has printed anything{suggest(unknown[0], files)}")
     tails: dict[str, Tail] = {}
-    for now, last in _read_repeatedly(run, follow=follow, keep_on=keep_on):
+
+    def read(now: Run, *, torn: bool) -> Iterator[tuple[str, str, int]]:
         files = NodeLogs(now.record.logs).files()
         width = max(map(len, files), default=0)
         for name, path in files.items():
             if not nodes or name in nodes:
                 tail = tails.setdefault(name, Tail(path))
                 tail.path = path
-                for line in tail.lines(torn=last):
-                    yield name, line, width
+                yield from ((name, line, width) for line in tail.lines(torn=torn))
+
+    for update in follow(run, keep_on=keep_on) if until_end else ():
+        run = update.run
+        yield from read(run, torn=False)
+    # Nodes may have printed since the last look.
+    yield from read(run, torn=True)
 
 
-def read_events(run: Run, *, keep_on: Callable[[], bool] = lambda: True) -> Iterator[tuple[Event, str]]:
-    """Read the events of a run, from its start until it ends or `keep_on` returns false.
-
-    Yields:
-        An event, and the line of JSON in which it is written.
-    """
-    tail = Tail(run.record.logs / EVENTS)
-    for now, _ in _read_repeatedly(run, follow=True, keep_on=keep_on):
-        yield from _read_new_events(tail, now)
-
-
-def _read_new_events(tail: Tail, run: Run) -> Iterator[tuple[Event, str]]:
-    """The events of a run that were written since the last call, and the line of each."""
+def _read_new_events(tail: Tail, run: Run) -> tuple[Event, ...]:
+    """Read the events of a run that were written since the last call."""
     # A run that is begun in the background moves its events and logs to another directory once its plan is made.
     tail.path = run.record.logs / EVENTS
-    for line in tail.lines():
-        # If the run resumes a dataset, the file has the events of earlier runs, too.
-        if (event := parse(line)) is not None and event.run == run.id:
-            yield event, line
-
-
-def _read_repeatedly(run: Run, *, follow: bool, keep_on: Callable[[], bool]) -> Iterator[tuple[Run, bool]]:
-    """Look at a run several times a second while it lives (if it is to be followed), and once at the end.
-
-    Yields:
-        The run as it is now, and whether this is the last look.
-    """
-    while follow and keep_on() and (run := run.now()).status == "running":
-        yield run, False
-        time.sleep(_READ_S)
-    # The logs are read once more after the end, because nodes may have printed since the last look.
-    yield run, True
+    # If the run resumes a dataset, the file has the events of earlier runs, too.
+    return tuple(event for event in filter(None, map(parse, tail.lines())) if event.run == run.id)

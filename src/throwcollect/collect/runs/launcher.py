@@ -94,10 +94,8 @@ class _Session:
 
     def __init__(self, run: Run, reporter: Reporter, interruptions: Callable[[], int]) -> None:
         self.interruptions = interruptions
-        self.say = reporter.say
-        self.warn = reporter.warn
+        self.reporter = reporter
         self._run = run
-        self._reporter = reporter
         self._states: list[NodeState] = []
         self._progress: Progress | None = None
         self._written_at = 0.0
@@ -106,7 +104,7 @@ class _Session:
     def update(self, progress: Progress) -> None:
         # The progress is written together with the next change of the nodes.
         self._progress = progress
-        self._reporter.update(progress)
+        self.reporter.update(progress)
 
     def event(self, event: RunEvent, **details: Any) -> None:
         self._write([Event(run=self._run.id, event=event, **details)])
@@ -146,4 +144,4 @@ class _Session:
             if not self._failed:
                 self._failed = True
                 reason = error.message if isinstance(error, ConfigError) else str(error)
-                self._reporter.warn(f"the record and the events of this run are no longer written: {reason}")
+                self.reporter.warn(f"the record and the events of this run are no longer written: {reason}")

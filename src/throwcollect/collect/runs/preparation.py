@@ -110,7 +110,7 @@ def resume(
             sweep_directory=directory if file is None else file.parent,
             processes=processes,
             # This fails before anything is written if nothing can be simulated here, so a finished dataset stays so.
-            before_writing=lambda: choices.append(choose(read, say=reporter.say, warn=reporter.warn)),
+            before_writing=lambda: choices.append(choose(read, reporter)),
             reporter=reporter,
         )
         if has_all_trials(directory, plan):
@@ -179,7 +179,7 @@ def prepare_run(
         if callable(plan):
             undo.callback(remove_plan, directory, made=is_new)
         # A runtime may take minutes to get an image, so it is chosen after all other checks.
-        choice = choice or choose(config, say=reporter.say, warn=reporter.warn)
+        choice = choice or choose(config, reporter)
         place, logs = Path(os.path.realpath(directory)), directory.absolute() / "logs"
         run.write(add_runtime(replace(record, directory=place, logs=logs), config, *choice, reporter=reporter))
         _warn_if_others_may_join(config, choice[1], reporter)

@@ -64,8 +64,8 @@ class InProcess:
 
         directory = self._record.directory
         session.event("started", simulations=1)
-        with TrialCollection.open(directory, say=session.say) as collection:
-            collection.warn = session.warn
+        with TrialCollection.open(directory, say=session.reporter.say) as collection:
+            collection.warn = session.reporter.warn
             simulator = Simulator(self._config, on_frame=lambda: None)
             try:
                 self._simulate(collection, simulator, session)
@@ -83,7 +83,7 @@ class InProcess:
 
             # The dataset is finished even if trials are lost; the launcher reports the loss from the summary.
             with suppress(LossError):
-                collection.finish(meanwhile=wait, say=session.say)
+                collection.finish(meanwhile=wait, say=session.reporter.say)
         return info(directory)
 
     def _simulate(self, collection: TrialCollection, simulator: Simulator, session: Session) -> None:
@@ -103,8 +103,6 @@ class InProcess:
                     collection.take_in(_SIMULATION, episode)
             else:
                 collection.check_next()
-            if collection.backlog:
-                collection.write_one()
             collection.look_after()
             session.nodes(states, endpoint=None, simulations=1)
             if time.monotonic() >= self._reported_at + _REPORT_EVERY_S:

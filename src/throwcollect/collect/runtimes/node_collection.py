@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 
 from throwcollect import ros
 from throwcollect.collect.coordinator.progress import Progress
@@ -57,18 +56,11 @@ def roster(host: NodeHost, simulations: int) -> list[NodeSpec]:
     ]
 
 
-def offer_scaling(node: ros.Node, simulations: int, on_wanted: Callable[[int], None], *, most: int) -> None:
+def offer_scaling(node: ros.Node, simulations: int, *, most: int) -> None:
     """Declare the launcher's parameter by which any ROS 2 node may change the number of simulations, up to `most`."""
-
-    def report(parameters: list[ros.Parameter]) -> None:
-        for parameter in parameters:
-            if parameter.name == SIMULATIONS:
-                on_wanted(int(parameter.value))
-
     span = IntegerRange(from_value=0, to_value=most, step=1)
     descriptor = ros.ParameterDescriptor(description="Number of simulations.", integer_range=[span])
     node.declare_parameter(SIMULATIONS, simulations, descriptor)
-    node.add_post_set_parameters_callback(report)
 
 
 class NodeCollection:
@@ -77,7 +69,8 @@ class NodeCollection:
     def __init__(self, host: NodeHost, session: Session) -> None:
         self._host = host
         self._session = session
-        self._simulations = self._wanted = host.record.simulations
+        self._simulations = host.record.simulations
+        self._node: ros.Node | None = None
         self._apart_since = math.inf
         self._started_again = False
         self._supervisor = Supervisor(host, host.config.run, roster(host, self._simulations))
@@ -108,19 +101,20 @@ class NodeCollection:
         end = None
         while end is None and not self._session.interruptions():
             self._listen()
-            if self._wanted != self._simulations:
-                self._simulations = self._wanted
+            wanted = self._simulations if self._node is None else int(self._node.get_parameter(SIMULATIONS).value)
+            if wanted != self._simulations:
+                self._simulations = wanted
                 self._session.event("scaled", simulations=self._simulations)
                 self._supervisor.change(roster(self._host, self._simulations))
             end, news = self._supervisor.poll()
             for line in news:
-                self._session.warn(line)
+                self._session.reporter.warn(line)
             self._session.nodes(self._supervisor.states(), endpoint=self._host.endpoint, simulations=self._simulations)
         if end is None:
             self._session.event("stopping")
             if not self._host.record.collects:
                 return None
-            self._session.say("interrupted: finishing the running trials; once more ends at once")
+            self._session.reporter.say("interrupted: finishing the running trials; once more ends at once")
             end = self._supervisor.drain(hurry=lambda: self._session.interruptions() > 1)
         # While this process waited for the end of the coordinator, its last report may have arrived.
         self._listen()
@@ -160,7 +154,7 @@ class NodeCollection:
             self._started_again = True
             # The new nodes get the same time to meet, from the first report of the new coordinator on.
             self._apart_since = math.inf
-            self._session.warn("the coordinator does not see the simulations; all of them are started again")
+            self._session.reporter.warn("the coordinator does not see the simulations; all of them are started again")
             self._supervisor.replace([state.name for state in states if state.name != ROUTER])
         else:
             raise WorkerError(
@@ -175,8 +169,6 @@ class NodeCollection:
         for name, text in ((CONFIGURATION, config_text(config)), (ROBOT_FILES, pack_robot(config))):
             node.declare_parameter(name, text, ros.ParameterDescriptor(read_only=True))
         most = 1 if config.run.root_namespace else MOST_SIMULATIONS
-        offer_scaling(node, self._simulations, self._request_simulations, most=most)
-
-    def _request_simulations(self, simulations: int) -> None:
-        # `_follow` scales the run later, so that the client that sets the parameter does not wait for nodes to end.
-        self._wanted = simulations
+        offer_scaling(node, self._simulations, most=most)
+        # `_follow` reads it, so that the client that sets the parameter does not wait for nodes to end.
+        self._node = node

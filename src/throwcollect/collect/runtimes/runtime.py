@@ -20,6 +20,7 @@ from throwcollect.wording import suggest
 
 if TYPE_CHECKING:
     from throwcollect.collect.coordinator.progress import Progress
+    from throwcollect.collect.coordinator.reporter import Reporter
     from throwcollect.collect.runtimes.nodes import NodeHost
     from throwcollect.collect.runtimes.run_record import NodeState, RunRecord
     from throwcollect.config.schema import Config
@@ -46,11 +47,7 @@ class Check:
 class Session(Protocol):
     """The launcher, as the host of the run sees it: it takes reports, and counts requests to stop."""
 
-    def say(self, line: str) -> None:
-        """Show the user a line of information."""
-
-    def warn(self, line: str) -> None:
-        """Show the user a warning."""
+    reporter: Reporter
 
     def update(self, progress: Progress) -> None:
         """Show the user a progress report."""
@@ -113,13 +110,8 @@ class Runtime(ABC):
             WorkerError: If this machine does not have the runtime.
         """
 
-    def prepare(
-        self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
-    ) -> Middleware:
-        """Make sure that this machine can do a run, even if that takes minutes.
-
-        `middleware` is that of this process. `say` gets a line before each long step, and `warn` gets
-        a line about anything that may be wrong.
+    def prepare(self, config: Config, middleware: Middleware, reporter: Reporter) -> Middleware:
+        """Make sure that this machine can do a run, even if that takes minutes; `middleware` is that of this process.
 
         Returns:
             The middleware that will carry the messages of the nodes.
@@ -179,12 +171,10 @@ def find_runtime(name: str) -> Runtime | None:
         return None
 
 
-def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], None]) -> tuple[str, Middleware]:
+def choose(config: Config, reporter: Reporter) -> tuple[str, Middleware]:
     """Choose the runtime that a configuration asks for, and make sure that it can be used.
 
-    With ``auto``, nodes are containers if an engine for them is available. rclpy is used where it is installed. `say`
-    gets a line for each step that takes long, such as pulling an image, and then the choice. `warn` gets a line for
-    everything that may be wrong, such as an image that was made from other sources.
+    With ``auto``, nodes are containers if an engine for them is available. rclpy is used where it is installed.
 
     Returns:
         Name of the runtime, and the middleware that carries the messages of its nodes.
@@ -195,9 +185,9 @@ def choose(config: Config, *, say: Callable[[str], None], warn: Callable[[str], 
         runtime = get_runtime(name)
         # A runtime imports the packages that only it needs when it is used.
         with explain_missing():
-            middleware = runtime.prepare(config, launcher, say=say, warn=warn)
+            middleware = runtime.prepare(config, launcher, reporter)
         rclpy = f" on genuine rclpy with {middleware.rmw}" if middleware.backend == "rclpy" else ""
-        say(f"runtime: {runtime.describe(config)}{rclpy}{note}")
+        reporter.say(f"runtime: {runtime.describe(config)}{rclpy}{note}")
         return name, middleware
 
     # Simulations of other machines can join a run only if its nodes are processes.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 import subprocess
 from pathlib import Path
@@ -51,7 +50,6 @@ def directory(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """A directory with a plan, under a name that a shell may stumble over."""
     path = tmp_path / str(request.param)
     path.mkdir()
-    (path / "plan.parquet").touch()
     return path
 
 
@@ -93,7 +91,6 @@ def test_an_array_task_collects_its_slice(directory: Path, tmp_path: Path) -> No
 
 
 def test_a_task_in_an_image_gets_its_directories_and_no_variables_of_the_host(tmp_path: Path) -> None:
-    (tmp_path / "plan.parquet").touch()
     made = scripts(tmp_path, image=Path("/images/t.sif"), binds=["/data:/inside:ro", "/$NAME"])
     done = run(made.collect(8, "0-7"), tmp_path, srun='printf "%s\\n" "$@"', NAME="mine")
     words = done.stdout.splitlines()
@@ -105,19 +102,11 @@ def test_a_task_in_an_image_gets_its_directories_and_no_variables_of_the_host(tm
 
 
 def test_lines_and_modules_of_the_site_come_before_the_task(tmp_path: Path) -> None:
-    (tmp_path / "plan.parquet").touch()
     made = scripts(tmp_path, lines=["#SBATCH --gres=tmp:10G", "export SITE=here"], modules=["apptainer/1.4"])
     script = made.collect(8, "0-7")
     assert options(script)["gres"] == "tmp:10G"
     done = run(script, tmp_path, module='echo "module $*"', srun='echo "SITE=$SITE"')
     assert done.stdout.splitlines() == ["module load apptainer/1.4", "SITE=here"]
-
-
-def test_the_script_fails_without_running_if_the_node_does_not_see_the_directory(tmp_path: Path) -> None:
-    done = run(scripts(tmp_path / "nowhere").collect(8, "0-7"), tmp_path, srun="echo ran")
-    assert done.returncode == 2
-    assert re.search(r"does not see .*nowhere/plan.parquet: is it on a file system that all nodes share\?", done.stderr)
-    assert not done.stdout
 
 
 @pytest.mark.parametrize(
@@ -126,7 +115,6 @@ def test_the_script_fails_without_running_if_the_node_does_not_see_the_directory
 def test_an_interrupted_task_is_queued_again_up_to_ten_times(
     tmp_path: Path, code: int, restarts: int, queued: bool
 ) -> None:
-    (tmp_path / "plan.parquet").touch()
     done = run(
         scripts(tmp_path).collect(8, "0-7"),
         tmp_path,

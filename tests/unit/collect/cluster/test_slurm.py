@@ -14,7 +14,8 @@ QUEUE = """\
 7|1|OUT_OF_MEMORY|a1|OutOfMemory
 7|2|PENDING||BeginTime
 7|3|NEW_IN_ANOTHER_VERSION|a2|None
-8|0|RUNNING|a2|None
+7|4|FAILED|a3|JobLaunchFailure
+8|N/A|PENDING||Dependency
 """
 
 
@@ -25,13 +26,16 @@ def test_a_task_that_slurm_warns_of_its_time_limit_counts_as_running(
     (tmp_path / "squeue").write_text(f"#!/bin/sh\ncat <<END\n{QUEUE}END\n")
     (tmp_path / "squeue").chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    tasks = slurm.find_tasks()["7"]
-    assert [(task.index, task.lives, task.runs) for task in tasks] == [
-        (0, True, True),
-        (1, False, False),
-        (2, True, False),
-        (3, True, False),
+    found = slurm.find_tasks()
+    assert [(task.index, task.lives, task.runs, task.saw_no_directory) for task in found["7"]] == [
+        (0, True, True, False),
+        (1, False, False, False),
+        (2, True, False, False),
+        (3, True, False, False),
+        (4, False, False, True),
     ]
+    (joining,) = found["8"]
+    assert (joining.index, joining.reason) == (None, "Dependency")
 
 
 def test_a_refusal_by_slurm_names_the_file_and_option_that_correct_it(

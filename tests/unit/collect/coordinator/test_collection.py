@@ -67,14 +67,13 @@ def test_a_simulation_that_dies_loses_only_the_trial_that_it_ran(
     collection.leave("/sim_0", "left the ROS graph")
     assert [(event["trial"], event["reason"]) for event in events(tmp_path, "fail")] == [(1, "left the ROS graph")]
     assert not events(tmp_path, "lost")
-    collection.settle("/sim_0", alive=False)
+    collection.join("/sim_0", "sim_0", replaced=True)
+    collection.leave("/sim_0", "left the ROS graph")
     assert [event["trial"] for event in events(tmp_path, "lost")] == [1]
     collection.join("/sim_1", "sim_1")
     assert collection.lease("/sim_1") == (2, 3, 4, 5)
     for trial in (2, 3, 4, 5):
         collection.take_in("/sim_1", deliveries[trial])
-    while collection.backlog:
-        collection.write_one()
     assert collection.complete
     assert collection.progress().outcomes == {"landed": 5, "lost": 1}
     with pytest.raises(LossError):
@@ -90,7 +89,6 @@ def test_a_simulation_that_comes_back_has_lost_no_trial(
     for _ in range(5):
         assert collection.lease("/sim_0") == (0, 1, 2, 3)
         collection.leave("/sim_0", "left the ROS graph")
-        collection.settle("/sim_0", alive=True)
         collection.join("/sim_0", "sim_0")
     assert not events(tmp_path, "lost")
 
@@ -108,8 +106,6 @@ def test_the_first_episode_of_a_trial_counts_and_later_ones_are_dropped(
     assert collection.lease("/sim_1") == (1, 2, 3)
     for simulation in ("/sim_0", "/sim_1"):
         assert not collection.take_in(simulation, deliveries[0])
-    while collection.backlog:
-        collection.write_one()
     assert not collection.take_in("/sim_1", deliveries[0])
     assert [event["trial"] for event in events(tmp_path, "commit")] == [0]
     assert not warnings
@@ -159,7 +155,6 @@ def test_draining_leaves_each_simulation_only_the_trial_that_runs(
     assert changes == [(0,)]
     assert not collection.finished
     collection.take_in("/sim_0", deliveries[0])
-    collection.write_one()
     assert collection.lease("/sim_0") == ()
     assert collection.finished
 
@@ -174,4 +169,4 @@ def test_a_trial_without_retries_whose_episode_is_refused_is_lost(
     assert not collection.take_in("/sim_0", change(deliveries[1], result="{}"))
     assert "trial 0 is lost: its episode is refused: its values are not those of the plan" in said[0]
     assert "trial 1 is lost: its episode is refused: result of a trial: " in said[1]
-    assert not collection.backlog
+    assert collection.progress().outcomes == {"lost": 2}

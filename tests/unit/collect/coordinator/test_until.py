@@ -76,10 +76,8 @@ def collect(
                     collection.refuse(name, leased[0], "it is lost")
                 else:
                     assert collection.take_in(name, deliver(leased[0]))
-            elif not collection.backlog:
+            else:
                 collection.check_next()
-            if random.random() < 0.5 and collection.backlog:
-                collection.write_one()
             if kill_after is not None and len(ran) >= kill_after:
                 return ran
         collection.finish(meanwhile=lambda: None, say=lambda _: None)

@@ -10,7 +10,7 @@ from throwcollect.collect.runs.control import scale
 from throwcollect.collect.runs.records import Records
 from throwcollect.collect.runs.run import Run
 from throwcollect.collect.runtimes.node_collection import MOST_SIMULATIONS, offer_scaling
-from throwcollect.collect.runtimes.nodes import LAUNCHER
+from throwcollect.collect.runtimes.nodes import LAUNCHER, SIMULATIONS
 from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.ros import Context, Node, SingleThreadedExecutor
 from throwcollect.ros.middleware import Middleware
@@ -42,19 +42,13 @@ def endpoint(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 
 @pytest.fixture
-def most() -> int:
-    return MOST_SIMULATIONS
-
-
-@pytest.fixture
-def wanted(endpoint: str, most: int, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
-    """The numbers of simulations that a launcher is asked for."""
-    asked: list[int] = []
+def launcher(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Node]:
+    """The node of a launcher with one simulation."""
     monkeypatch.setenv(OVERRIDE_VARIABLE, f'connect/endpoints=["{endpoint}"]')
     context = Context()
     context.init()
     node = Node(LAUNCHER, context=context)
-    offer_scaling(node, 1, asked.append, most=most)
+    offer_scaling(node, 1, most=MOST_SIMULATIONS)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     done = threading.Event()
@@ -65,14 +59,14 @@ def wanted(endpoint: str, most: int, monkeypatch: pytest.MonkeyPatch) -> Iterato
 
     thread = threading.Thread(target=serve)
     thread.start()
-    yield asked
+    yield node
     done.set()
     thread.join()
     context.shutdown()
 
 
-def test_scaling_asks_the_launcher_for_the_number_of_simulations(endpoint: str, wanted: list[int]) -> None:
+def test_scaling_asks_the_launcher_for_the_number_of_simulations(endpoint: str, launcher: Node) -> None:
     run = living(endpoint)
     for simulations in (5, 0, 256):
         scale(run, simulations)
-    assert wanted == [5, 0, 256]
+        assert launcher.get_parameter(SIMULATIONS).value == simulations

@@ -21,7 +21,6 @@ def test_doctor_finds_no_problem_on_a_machine_that_runs_the_tests(tmp_path: Path
         "python",
         "extras",
         "cores",
-        "memory",
         "pybullet",
         "mujoco",
         "robot",

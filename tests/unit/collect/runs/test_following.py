@@ -40,7 +40,7 @@ def planned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Run, Calla
 
 def test_logs_are_followed_when_they_move_to_the_dataset(planned: tuple[Run, Callable[[], bool]]) -> None:
     run, go_on = planned
-    lines = [(name, line) for name, line, _ in read_logs(run, (), follow=True, keep_on=go_on)]
+    lines = [(name, line) for name, line, _ in read_logs(run, (), until_end=True, keep_on=go_on)]
     assert lines == [("launcher", "plan: 3 trials"), ("sim_0", "ready")]
 
 

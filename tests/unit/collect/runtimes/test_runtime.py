@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from tests.unit.collect.coordinator.listener import Listener
 
 from throwcollect import extras, members
+from throwcollect.collect.coordinator.reporter import SILENT
 from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.collect.runtimes.runtime import AUTOMATIC, Host, Runtime, choose, get_runtime
 from throwcollect.config.schema import Config
@@ -54,10 +56,10 @@ def test_every_runtime_of_the_table_is_valid_in_a_configuration() -> None:
 
 def test_a_runtime_can_be_added_by_another_package(added: None, tmp_path: Path) -> None:
     assert type(get_runtime("cluster")).__name__ == "Cluster"
-    config, said = Config(), list[str]()
+    config, listener = Config(), Listener()
     config = config.model_copy(update={"run": config.run.model_copy(update={"runtime": "cluster"})})
-    assert choose(config, say=said.append, warn=said.append)[0] == "cluster"
-    assert said == ["runtime: a cluster"]
+    assert choose(config, listener)[0] == "cluster"
+    assert listener.said == ["runtime: a cluster"]
 
 
 def test_a_configuration_can_name_a_runtime_of_another_package(added: None, tmp_path: Path) -> None:
@@ -79,6 +81,6 @@ def test_a_missing_package_of_the_engine_is_an_error_before_nodes_start(
         config = Config.model_validate({"sim": {"engine": each}})
         if each == engine:
             with pytest.raises(MissingExtraError, match=f"this needs {package}, which is not installed"):
-                get_runtime(name).prepare(config, middleware, say=print, warn=print)
+                get_runtime(name).prepare(config, middleware, SILENT)
         else:
-            assert get_runtime(name).prepare(config, middleware, say=print, warn=print) is middleware
+            assert get_runtime(name).prepare(config, middleware, SILENT) is middleware

@@ -7,6 +7,7 @@ from unittest.mock import Mock
 
 import pytest
 from docker.client import DockerClient
+from tests.unit.collect.coordinator.listener import Listener
 
 from throwcollect.collect.runtimes.docker import docker_engine as docker_engine
 from throwcollect.collect.runtimes.docker import docker_engine as docker_image
@@ -24,11 +25,11 @@ def choose() -> Callable[..., tuple[str, list[str]]]:
     """Chooses the runtime and returns what was printed; warnings begin with an exclamation mark."""
 
     def choose(runtime: str, image: str | None = None) -> tuple[str, list[str]]:
-        said: list[str] = []
+        listener = Listener()
         config = Config(run=RunConfig(runtime=runtime), containers=ContainersConfig(image=image))
-        name, middleware = choose_runtime(config, say=said.append, warn=lambda line: said.append(f"! {line}"))
+        name, middleware = choose_runtime(config, listener)
         assert middleware == Middleware()
-        return name, said
+        return name, [*(f"! {line}" for line in listener.warnings), *listener.said]
 
     return choose
 
@@ -109,10 +110,10 @@ def test_containers_use_middleware_of_their_image_that_the_launcher_can_join(
     labels = {} if rmw is None else {docker_image.RMW_LABEL: rmw}
     monkeypatch.setattr(docker_image, "ensure", lambda *_, **__: SimpleNamespace(labels=labels))
     monkeypatch.setattr("throwcollect.collect.runtimes.runtime.choose_middleware", lambda _: launcher)
-    said: list[str] = []
-    _, found = choose_runtime(Config(run=RunConfig(runtime="docker", ros=ros)), say=said.append, warn=said.append)
+    listener = Listener()
+    _, found = choose_runtime(Config(run=RunConfig(runtime="docker", ros=ros)), listener)
     assert found == expected
-    assert ("on genuine rclpy" in said[0]) == (expected.backend == "rclpy")
+    assert ("on genuine rclpy" in listener.said[0]) == (expected.backend == "rclpy")
 
 
 @pytest.mark.parametrize("host", ["tcp://192.0.2.7:2375", "ssh://lab"])

@@ -18,6 +18,7 @@ from throwcollect.extras import is_installed
 from throwcollect.ros.middleware import Middleware
 
 if TYPE_CHECKING:
+    from throwcollect.collect.coordinator.reporter import Reporter
     from throwcollect.collect.runtimes.docker.docker_nodes import DockerNodes
     from throwcollect.config.schema import Config
 
@@ -43,9 +44,7 @@ class DockerRuntime(Runtime):
 
         return DockerNodes(record, config, warn=warn)
 
-    def prepare(
-        self, config: Config, middleware: Middleware, *, say: Callable[[str], None], warn: Callable[[str], None]
-    ) -> Middleware:
+    def prepare(self, config: Config, middleware: Middleware, reporter: Reporter) -> Middleware:
         """Get the image, and find out the middleware of containers; see `Runtime.prepare`."""
         if is_installed("docker"):
             check_socket()
@@ -54,13 +53,13 @@ class DockerRuntime(Runtime):
 
         name, patience_s = choose_image(config), docker.PATIENCE_S if config.run.runtime == "docker" else _PROBE_S
         with closing(docker.connect(timeout_s=patience_s)) as client:
-            labels = docker.ensure(client, name, say=say).labels
+            labels = docker.ensure(client, name, say=reporter.say).labels
             if are_others(labels.get(SOURCES_LABEL)):
                 finding = f"the image {name} was made from other sources than these"
                 # It may collect other bytes, so it is used only if the user has named it.
                 if config.containers.image is None:
                     raise WorkerError(f"{finding}; {docker.BUILD_COMMAND} builds it anew")
-                warn(f"{finding}; it is used, as containers.image names it")
+                reporter.warn(f"{finding}; it is used, as containers.image names it")
             return _choose_middleware(labels.get(docker.RMW_LABEL), name, config, middleware)
 
     def check(self) -> Check:
