@@ -62,8 +62,6 @@ class TrialCollection:
         checked = (number for number in trials.numbers_to_run if number < self._next_to_check)
         self._leases = Leases(checked, retries=self._config.run.retries)
         self._names: dict[str, str] = {}
-        self._left: dict[str, int] = {}
-        """Trials that simulations held when they went out of sight; they count as failed only if these had ended."""
         self._took_part: set[str] = set()
         self._settings = Settings(self._config)
         task = task_of(self._config)
@@ -149,26 +147,23 @@ class TrialCollection:
         self._rate = TrialRate(self._leases.ended)
         return True
 
-    def join(self, simulation: str, name: str, *, replaced: bool = False) -> None:
-        """Note the address of a simulation that can be given trials, and the name of its node.
-
-        If it has `replaced` one that has left, that one had ended, and has failed with the trial that it held.
-        """
-        trial = self._left.pop(simulation, None)
-        if replaced and trial is not None and (reasons := self._leases.blame(simulation, trial)) is not None:
-            self._lose(trial, reasons)
+    def join(self, simulation: str, name: str) -> None:
+        """Note the address of a simulation that can be given trials, and the name of its node."""
         self._names[simulation] = name
         self._took_part.add(name)
 
     def leave(self, simulation: str, reason: str) -> None:
-        """Forget a simulation that is out of sight, and take its trials back; it may come back alive."""
-        if held := self._leases.find_held(simulation):
-            self._left[simulation] = held[0]
-        self.take_back(simulation, reason, alive=True)
+        """Forget a simulation that is out of sight, and take its trials back; call `settle` when its fate is known."""
+        self.take_back(simulation, reason, alive=None)
         self._leases.forget(simulation)
         self._prefetch.forget(simulation)
         self._agreed.discard(simulation)
         del self._names[simulation]
+
+    def settle(self, simulation: str, *, alive: bool) -> None:
+        """Note what became of a simulation that has left: only if it was not alive has it failed with its trial."""
+        if (given_up := self._leases.settle(simulation, alive=alive)) is not None:
+            self._lose(*given_up)
 
     def lease(self, simulation: str) -> tuple[int, ...]:
         """Give further trials to a simulation that has few, and return all trials that it has to do, in order."""
@@ -220,11 +215,11 @@ class TrialCollection:
             return
         self._give_back(simulation, trial, reason, self._leases.fail(simulation, trial, reason, refused=True))
 
-    def take_back(self, simulation: str, reason: str, *, refused: bool = False, alive: bool = False) -> None:
+    def take_back(self, simulation: str, reason: str, *, refused: bool = False, alive: bool | None = False) -> None:
         """Take all trials back from a simulation, which failed with the first and had not begun the others.
 
         The reason is kept as evidence. With `refused`, the simulation refused the trials, and may refuse all others.
-        If it is `alive`, this does not count.
+        If it is `alive`, this does not count; None if only a later call of `settle` decides it.
         """
         self._leases.release(simulation)
         for trial in self._leases.find_held(simulation):
@@ -265,18 +260,15 @@ class TrialCollection:
         if settled and not self._replay.begun and remaining <= _REPLAY_AHEAD_S * self._rate.per_s:
             self._replay.begin(list(self.writer.plan.trials.numbers_to_run))
 
-    def progress(self, hung: Iterable[str] = (), *, unreached: int = 0) -> Progress:
-        """Report how far the collection has come.
-
-        `hung` names the simulations that took too long for a trial; `unreached` is how many cannot be asked (yet).
-        """
+    def progress(self, hung: Iterable[str] = ()) -> Progress:
+        """Report how far the collection has come; `hung` names the simulations that took too long for a trial."""
         ended = self._leases.ended
         self._rate.note(ended)
         return Progress(
             total=self._leases.total,
             ended=ended,
             outcomes=dict(self._outcomes),
-            simulations=len(self._names) - unreached,
+            simulations=len(self._names),
             throws_per_s=self._rate.per_s,
             hung=sorted(hung),
             wanted=self._config.until.wanted if self._config.until else None,

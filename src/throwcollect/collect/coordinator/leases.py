@@ -55,6 +55,8 @@ class Leases:
         self._retries = retries
         self._held: dict[str, list[int]] = {}
         self._failures: dict[int, list[_Failure]] = {}
+        self._missed: dict[str, int] = {}
+        """Trials that simulations held which are out of sight, and may come back alive."""
         self._refusals: dict[str, list[tuple[int, str]]] = {}
         """Trials that a simulation has refused since it could do one, with the reasons."""
         self.total = 0
@@ -134,12 +136,12 @@ class Leases:
         self._completed += 1
 
     def fail(
-        self, simulation: str, trial: int, reason: str, *, refused: bool = False, alive: bool = False
+        self, simulation: str, trial: int, reason: str, *, refused: bool = False, alive: bool | None = False
     ) -> list[str] | None:
         """Take a trial back from a simulation that was lost or could not do it; let it wait again, or give it up.
 
         The reason is kept as evidence. With `refused`, the simulation refused the trial, and may refuse all others. If
-        it is `alive`, this does not count, unless `blame` is called later.
+        it is `alive`, this does not count; None if only a later call of `settle` decides it.
 
         Returns:
             All reasons when its retries are used up, else None.
@@ -147,19 +149,29 @@ class Leases:
         self._drop(simulation, trial)
         if refused:
             self._refusals.setdefault(simulation, []).append((trial, reason))
+        if alive is None:
+            self._missed[simulation] = trial
         self._failures.setdefault(trial, []).append(_Failure(simulation, reason, counts=not alive))
         self._returned.append(trial)
         return self._give_up(trial)
 
-    def blame(self, simulation: str, trial: int) -> list[str] | None:
-        """Count the last failure of a simulation with a trial after all, as it had ended; returns what `fail` does."""
+    def settle(self, simulation: str, *, alive: bool) -> tuple[int, list[str]] | None:
+        """Note what became of a simulation that was out of sight: it was alive, or it had ended.
+
+        Returns:
+            The trial that is given up now, and all reasons; None if there is none.
+        """
+        trial = self._missed.pop(simulation, None)
+        if trial is None:
+            return None
         failures = reversed(self._failures[trial])
-        next(failure for failure in failures if failure.simulation == simulation).counts = True
-        return self._give_up(trial)
+        next(failure for failure in failures if failure.simulation == simulation).counts = not alive
+        reasons = self._give_up(trial)
+        return None if reasons is None else (trial, reasons)
 
     def _give_up(self, trial: int) -> list[str] | None:
-        """Give up a trial that waits if its retries are used up."""
-        if trial not in self._returned or sum(failure.counts for failure in self._failures[trial]) <= self._retries:
+        """Give up an open trial if its retries are used up, and no simulation that failed with it may be alive."""
+        if not self.is_open(trial) or not self._is_used_up(trial) or trial in self._missed.values():
             return None
         self._returned.remove(trial)
         self._end(trial)
@@ -185,7 +197,10 @@ class Leases:
 
     def _may_try(self, simulation: str, trial: int, rivals: Collection[str]) -> bool:
         failed = {failure.simulation for failure in self._failures.get(trial, ())}
-        return simulation not in failed or failed.issuperset(rivals)
+        return not self._is_used_up(trial) and (simulation not in failed or failed.issuperset(rivals))
+
+    def _is_used_up(self, trial: int) -> bool:
+        return sum(failure.counts for failure in self._failures.get(trial, ())) > self._retries
 
     def _take_fresh(self, trial: int) -> None:
         self._open[trial] = _HANDED_OUT

@@ -36,6 +36,8 @@ _WARNING_PERIOD_S = 10.0
 """Time between two warnings of the same thing."""
 _UNKNOWN = "_NODE_NAME_UNKNOWN_"
 """An RMW gives this name to a node when it has heard of its publisher, and not yet of the node."""
+_REACH_S = 6.0
+"""Time after which a simulation that cannot be asked counts as out of reach: nodes usually connect within a second."""
 
 
 class Coordinator(Node):
@@ -50,8 +52,10 @@ class Coordinator(Node):
         self._simulations: dict[str, SimulationClient] = {}
         self._discovered_changes = -1
         self._rests_until = 0.0
-        self._left: dict[str, AbstractSet[bytes]] = {}
-        """Publishers of simulations that are out of sight, by namespace."""
+        self._visible: set[str] = set()
+        self._unreached: dict[str, float] = {}
+        self._left: dict[str, tuple[AbstractSet[bytes], float]] = {}
+        """Publishers of simulations that are out of sight, by namespace, and since when [s]."""
         self._signer = Signer.of_environment()
         # A real-time factor slows trials down on purpose, even one that a viewer has set without the coordinator.
         # The slowest one is allowed for before a simulation counts as lost.
@@ -69,8 +73,7 @@ class Coordinator(Node):
     def report(self) -> Progress:
         """Publish the progress, and return it."""
         hung = {simulation.name for simulation in self._simulations.values() if simulation.hung}
-        unreached = sum(not simulation.ready() for simulation in self._simulations.values())
-        progress = self._collection.progress(hung, unreached=unreached)
+        progress = self._collection.progress(hung | self._unreachable)
         self._progress.publish(String(data=progress.to_json()))
         return progress
 
@@ -87,8 +90,25 @@ class Coordinator(Node):
                 self.get_logger().warning(f"{namespace}: no answer to the lease of {missing}, which is sent again")
             # Each time, trials of others may have come back, or the simulation may have become reachable.
             self._lease(namespace)
+        for namespace in [name for name, (_, since) in self._left.items() if now > since + self._patience_s]:
+            self._settle(namespace, alive=False)
+        self._notice_unreached(now)
+
+    def _notice_unreached(self, now: float) -> None:
+        """Note since when simulations have been in the graph without being ready: they are connected only in part."""
+        reached = {namespace for namespace, simulation in self._simulations.items() if simulation.ready()}
+        self._unreached = {
+            namespace: self._unreached.get(namespace, now) for namespace in self._visible if namespace not in reached
+        }
+
+    @property
+    def _unreachable(self) -> set[str]:
+        """Names of simulations that have been out of reach for too long; the launcher starts them again."""
+        latest = time.monotonic() - _REACH_S
+        return {self._collection.name_of(namespace) for namespace, since in self._unreached.items() if since < latest}
 
     def _find_simulations(self) -> None:
+        self._visible.clear()
         began_s = time.thread_time()
         offered = {namespace: (name, publishers) for namespace, name, publishers in self._find_offers()}
         self._rests_until = time.monotonic() + _REST * (time.thread_time() - began_s)
@@ -108,16 +128,20 @@ class Coordinator(Node):
                 on_episode=self._receive,
                 on_refusal=self._take_refusal,
             )
-            # Only its connection was lost if its publishers are those from before.
-            name, publishers = offered[namespace]
-            replaced = not publishers <= self._left.pop(namespace, publishers)
-            self._collection.join(namespace, name, replaced=replaced)
+            if namespace in self._left:
+                self._settle(namespace, alive=offered[namespace][1] <= self._left[namespace][0])
+            self._collection.join(namespace, offered[namespace][0])
 
     def _lose(self, namespace: str, reason: str) -> None:
         self._collection.leave(namespace, reason)
         simulation = self._simulations.pop(namespace)
         simulation.destroy()
-        self._left[namespace] = simulation.publishers
+        self._left[namespace] = simulation.publishers, time.monotonic()
+
+    def _settle(self, namespace: str, *, alive: bool) -> None:
+        """Note what became of a simulation out of sight: only its connection was lost if its publishers are there."""
+        del self._left[namespace]
+        self._collection.settle(namespace, alive=alive)
 
     def _find_offers(self) -> Iterator[tuple[str, str, frozenset[bytes]]]:
         """Find the simulations in the graph, nodes that publish episodes: namespace, name and publishers of each."""
@@ -128,6 +152,8 @@ class Coordinator(Node):
             publishers: defaultdict[str, set[bytes]] = defaultdict(set)
             for info in self.get_publishers_info_by_topic(topic):
                 publishers[info.node_name].add(bytes(info.endpoint_gid))
+            if publishers:
+                self._visible.add(above or "/")
             names = publishers.keys() - {_UNKNOWN}
             # If other nodes publish there too, the simulation is the node with the name of the namespace.
             names = names & {above.removeprefix("/")} or names

@@ -67,8 +67,7 @@ def test_a_simulation_that_dies_loses_only_the_trial_that_it_ran(
     collection.leave("/sim_0", "left the ROS graph")
     assert [(event["trial"], event["reason"]) for event in events(tmp_path, "fail")] == [(1, "left the ROS graph")]
     assert not events(tmp_path, "lost")
-    collection.join("/sim_0", "sim_0", replaced=True)
-    collection.leave("/sim_0", "left the ROS graph")
+    collection.settle("/sim_0", alive=False)
     assert [event["trial"] for event in events(tmp_path, "lost")] == [1]
     collection.join("/sim_1", "sim_1")
     assert collection.lease("/sim_1") == (2, 3, 4, 5)
@@ -89,6 +88,7 @@ def test_a_simulation_that_comes_back_has_lost_no_trial(
     for _ in range(5):
         assert collection.lease("/sim_0") == (0, 1, 2, 3)
         collection.leave("/sim_0", "left the ROS graph")
+        collection.settle("/sim_0", alive=True)
         collection.join("/sim_0", "sim_0")
     assert not events(tmp_path, "lost")
 

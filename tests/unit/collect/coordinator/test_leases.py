@@ -1,4 +1,3 @@
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -46,25 +45,40 @@ def test_failures_of_simulations_that_are_alive_never_give_a_trial_up() -> None:
     for _ in range(20):
         leases.lease("a")
         assert leases.fail("a", 0, "slow", alive=True) is None
+        leases.lease("a")
+        assert leases.fail("a", 0, "out of sight", alive=None) is None
+        assert leases.settle("a", alive=True) is None
     for given_up in (None, ["a: killed", "a: killed"]):
         leases.lease("a")
         assert leases.fail("a", 0, "killed") == given_up
 
 
-@pytest.mark.parametrize("elsewhere", [False, True])
-def test_a_simulation_is_blamed_for_its_last_trial_unless_another_one_has_that(elsewhere: bool) -> None:
+def test_a_trial_without_retries_left_waits_until_it_is_known_whether_its_simulation_lives() -> None:
     leases = Leases([0], retries=0)
+    for fate in (True, False):
+        assert leases.lease("a") == 0
+        assert leases.fail("a", 0, "out of sight", alive=None) is None
+        assert leases.lease("b") is None
+        assert leases.ended < leases.total
+        assert leases.settle("a", alive=fate) == (None if fate else (0, ["a: out of sight"]))
+    assert leases.ended == leases.total
+    assert leases.settle("a", alive=False) is None
+
+
+def test_a_simulation_that_comes_back_is_excused_only_for_its_last_failure() -> None:
+    leases = Leases([0], retries=1)
     leases.lease("a")
-    assert leases.fail("a", 0, "out of sight", alive=True) is None
-    if elsewhere:
-        assert leases.lease("b") == 0
-    assert leases.blame("a", 0) == (None if elsewhere else ["a: out of sight"])
-    assert leases.ended == (not elsewhere)
+    leases.fail("a", 0, "killed")
+    leases.lease("a")
+    leases.fail("a", 0, "out of sight", alive=None)
+    leases.settle("a", alive=True)
+    leases.lease("a")
+    assert leases.fail("a", 0, "killed") == ["a: killed", "a: killed"]
 
 
 ACTIONS = st.tuples(
     st.sampled_from("abcd"),
-    st.sampled_from(["lease", "complete", "come late", "release", "fail", "refuse", "leave", "restart"]),
+    st.sampled_from(["lease", "complete", "come late", "release", "fail", "refuse", "leave", "return", "restart"]),
 )
 
 
@@ -72,7 +86,6 @@ ACTIONS = st.tuples(
 def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: int, present: bool) -> None:
     leases = Leases(range(6), retries=retries)
     ended: list[int] = []
-    left: dict[str, int] = {}
 
     def act(simulation: str, action: str) -> None:
         held = leases.find_held(simulation)
@@ -84,11 +97,10 @@ def test_every_trial_ends_exactly_once(actions: list[tuple[str, str]], retries: 
         elif action == "leave":
             leases.release(simulation)
             for trial in held[:1]:
-                assert leases.fail(simulation, trial, "x", alive=True) is None
-                left[simulation] = trial
-        elif action == "restart" and simulation in left:
-            if leases.blame(simulation, trial := left.pop(simulation)) is not None:
-                ended.append(trial)
+                assert leases.fail(simulation, trial, "x", alive=None) is None
+        elif action in ("return", "restart"):
+            if (given_up := leases.settle(simulation, alive=action == "return")) is not None:
+                ended.append(given_up[0])
         elif action == "release":
             leases.release(simulation)
         elif action == "complete" and held:

@@ -11,6 +11,7 @@ from tests.unit.plan.own_plan import make_plan
 
 from throwcollect import ros
 from throwcollect.collect.coordinator.collection import TrialCollection
+from throwcollect.collect.coordinator_node import node as coordinator_node
 from throwcollect.collect.coordinator_node.node import Coordinator
 from throwcollect.config.loader import load
 from throwcollect.dataset.creation import create
@@ -65,6 +66,7 @@ class Bench:
 
 @pytest.fixture
 def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Bench]:
+    monkeypatch.setattr(coordinator_node, "_REACH_S", 0.5)
     with router("tcp/127.0.0.1:0") as endpoint:
         monkeypatch.setenv("ZENOH_CONFIG_OVERRIDE", f'mode="client";connect/endpoints=["{endpoint}"]')
         ros.init()
@@ -76,10 +78,19 @@ def bench(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, request: pytest.Fixtu
             ros.shutdown()
 
 
-def test_a_simulation_without_parameter_services_does_not_count(bench: Bench) -> None:
-    bench.simulation(whole=False)
-    assert bench.until(lambda: bench.coordinator.sees_simulations)
-    assert bench.coordinator.report().simulations == 0
+def test_a_simulation_without_parameter_services_is_reported_as_hung(bench: Bench) -> None:
+    node = bench.simulation(whole=False)
+    assert bench.until(lambda: bench.coordinator.report().simulations == 1)
+    assert bench.hung == []
+    assert bench.until(lambda: bench.hung == ["sim_0"])
+    node.destroy_node()
+    assert bench.until(lambda: bench.hung == [])
+
+
+def test_a_simulation_with_parameter_services_is_not_reported_as_hung(bench: Bench) -> None:
+    bench.simulation(whole=True)
+    assert bench.until(lambda: bench.coordinator.report().simulations == 1)
+    assert not bench.until(lambda: bench.hung != [], seconds=1.5)
 
 
 def test_a_restarted_simulation_replaces_its_predecessor(bench: Bench) -> None:
@@ -128,7 +139,7 @@ def test_a_simulation_whose_connection_was_cut_loses_no_trial_but_one_that_was_r
                 bench.coordinator._find_simulations()
         else:
             node.destroy_node()
-        assert bench.until(lambda: not bench.coordinator.sees_simulations)
+        assert bench.until(lambda: bench.coordinator.report().simulations == 0)
         if not cut:
             bench.simulation(whole=True)
         else:
@@ -136,6 +147,17 @@ def test_a_simulation_whose_connection_was_cut_loses_no_trial_but_one_that_was_r
         assert bench.until(lambda: bench.coordinator.report().simulations == 1)
     assert bench.reasons("fail") == ["left the ROS graph"] * 3
     assert bench.reasons("lost") == ["/sim_0: left the ROS graph"]
+
+
+@pytest.mark.parametrize("bench", ["run: {retries: 0}\n"], indirect=True)
+def test_a_simulation_that_does_not_come_back_loses_its_trial_when_its_time_is_up(bench: Bench) -> None:
+    node = bench.simulation(whole=True)
+    assert bench.until(lambda: any(client.trials for client in bench.coordinator._simulations.values()))
+    node.destroy_node()
+    assert bench.until(lambda: bench.reasons("fail") == ["left the ROS graph"])
+    assert bench.reasons("lost") == []
+    bench.coordinator._patience_s = 0.0
+    assert bench.until(lambda: bench.reasons("lost") == ["/sim_0: left the ROS graph"])
 
 
 SLOWED = "run: {{trial_timeout_s: 1.5}}\nsim: {{max_trial_s: 8, real_time_factor: {factor}}}\n"
