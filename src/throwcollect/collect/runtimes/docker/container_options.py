@@ -95,10 +95,13 @@ def publishes_port(config: Config) -> bool:
     return bool(config.run.router_port or any(section.ports for section in sections))
 
 
-def make_node_options(node: NodeSpec, *, record: RunRecord, config: Config, image_id: str) -> dict[str, Any]:
+def make_node_options(
+    node: NodeSpec, *, record: RunRecord, config: Config, image_id: str, address: str | None = None
+) -> dict[str, Any]:
     """Keywords for `containers.create` that make the container of a node.
 
-    The configuration may bind the node to another core. The id of the image goes into the dataset's provenance.
+    The configuration may bind the node to another core. The id of the image goes into the dataset's provenance; the
+    address is that in the run's network, None for any.
     """
     section, network = find_section(config, node.name), name_network(record.run)
     directory = str(record.directory.resolve())
@@ -121,7 +124,7 @@ def make_node_options(node: NodeSpec, *, record: RunRecord, config: Config, imag
         **options,
         "command": list(node.arguments),
         "network": network,
-        "networking_config": {network: EndpointConfig(API_VERSION, aliases=[node.name])},
+        "networking_config": {network: EndpointConfig(API_VERSION, aliases=[node.name], ipv4_address=address)},
         "cpuset_cpus": section.cpuset or (None if node.core is None else str(node.core)),
     }
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from ipaddress import ip_network
 from typing import Any
 
 from docker.client import DockerClient
+from docker.types import IPAMConfig, IPAMPool
 
 from throwcollect.collect.runtimes.docker.checks import check
 from throwcollect.collect.runtimes.docker.container_options import (
@@ -25,6 +27,9 @@ from throwcollect.collect.runtimes.run_record import RunRecord
 from throwcollect.config.run import NodeContainerConfig
 from throwcollect.config.schema import Config
 from throwcollect.ros.router_endpoint import LOOPBACK, format_endpoint
+
+_ROUTER_HOST = -2
+"""Index of the last address of a range, except for that of broadcasts."""
 
 
 class DockerNodes(ContainerHost):
@@ -55,13 +60,32 @@ class DockerNodes(ContainerHost):
         """Make the run's network, and watch its containers; see `NodeHost.open`."""
         hint = "throwcollect ps shows the runs that there are; throwcollect down removes one"
         with engine_errors(f"run {self.record.run} cannot be prepared on the Docker engine", hint=hint):
-            self._client.networks.create(
-                name_network(self.record.run),
-                driver="bridge",
-                internal=not publishes_port(self.config),
-                labels=make_labels(self.record),
-            )
+            self._create_network()
         super().open()
+
+    def _create_network(self) -> None:
+        """Make the run's network; on Fast DDS, the router has to be able to keep its address there.
+
+        Nodes on Fast DDS look up the address of their discovery server only once. A container can choose its address
+        only in a network whose range was named, so a first network serves to find a free range.
+        """
+        name = name_network(self.record.run)
+        options = {"driver": "bridge", "internal": not publishes_port(self.config), "labels": make_labels(self.record)}
+        network = self._client.networks.create(name, **options)
+        if self.record.middleware.is_fast_dds:
+            network.reload()
+            pool = IPAMPool(subnet=network.attrs["IPAM"]["Config"][0]["Subnet"])
+            network.remove()
+            self._client.networks.create(name, ipam=IPAMConfig(pool_configs=[pool]), **options)
+
+    def _address_of(self, node: NodeSpec) -> str | None:
+        """The address that a node is to have in the run's network; None if it may be any."""
+        if node.name != ROUTER or not self.record.middleware.is_fast_dds:
+            return None
+        with engine_errors("the engine does not report which addresses the run's network has"):
+            network = self._client.networks.get(name_network(self.record.run))
+        # The engine hands out addresses from the beginning of the range, so an address at its end stays free.
+        return str(ip_network(network.attrs["IPAM"]["Config"][0]["Subnet"])[_ROUTER_HOST])
 
     @property
     def endpoint(self) -> str | None:
@@ -76,5 +100,8 @@ class DockerNodes(ContainerHost):
 
     def make_options(self, node: NodeSpec) -> tuple[dict[str, Any], Sequence[str]]:
         """See `ContainerHost.make_options`."""
-        options = make_node_options(node, record=self.record, config=self.config, image_id=self._image_id)
+        address = self._address_of(node)
+        options = make_node_options(
+            node, record=self.record, config=self.config, image_id=self._image_id, address=address
+        )
         return options, self.find_section(node.name).networks
