@@ -8,7 +8,7 @@ import pytest
 
 import throwcollect
 from tests.integration.robot import ARM, CONFIG, ELBOW, OWN, POSTURE, Robot, goal, start_simulation, swing
-from throwcollect.control import GoalStatus
+from throwcollect.control.values import GoalStatus
 from throwcollect.robots.talos import TALOS
 from throwcollect.ros import Context
 

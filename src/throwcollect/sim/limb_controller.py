@@ -8,17 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.controllers import ControllersConfig
-from throwcollect.control import (
-    Constraints,
-    ControllerParameters,
-    ControllerState,
-    ErrorCode,
-    JointConstraints,
-    JointState,
-    JointTrajectoryController,
-    Trajectory,
-    TrajectoryRefusal,
-)
+from throwcollect.control.controller import JointTrajectoryController
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
+from throwcollect.control.values import ControllerState, ErrorCode, JointState, Trajectory, TrajectoryRefusal
 from throwcollect.episode.record import ControllerSamples
 from throwcollect.robots.robot import Robot
 

@@ -11,7 +11,8 @@ from enum import IntEnum
 import numpy as np
 
 from throwcollect.config.schema import Config
-from throwcollect.control import JointTrajectoryController, Trajectory, TrajectoryGoal, TrajectoryRefusal
+from throwcollect.control.controller import JointTrajectoryController
+from throwcollect.control.values import Trajectory, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.engines.engine import BodyState, SceneBody
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.errors import RequestError

@@ -8,12 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.control import (
-    ErrorCode,
-    Trajectory,
-    TrajectoryGoal,
-    TrajectoryRefusal,
-)
+from throwcollect.control.values import ErrorCode, Trajectory, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.errors import RequestError
 from throwcollect.robots.robot import Robot
 from throwcollect.robots.trajectory import JointTrajectory

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.control import GoalResult, GoalStatus, TrajectoryGoal, TrajectoryRefusal
+from throwcollect.control.values import GoalResult, GoalStatus, TrajectoryGoal, TrajectoryRefusal
 from throwcollect.episode.channels import Channels
 from throwcollect.episode.episode_message import Episode
 from throwcollect.episode.message_table import ChunkEncoder

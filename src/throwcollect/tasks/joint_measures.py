@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from throwcollect.config.schema import Config
-from throwcollect.control import GoalStatus
+from throwcollect.control.values import GoalStatus
 from throwcollect.episode.record import EpisodeHeader, Samples
 from throwcollect.robots.description import robot_of
 from throwcollect.robots.robot import joint_limits, shares_of

@@ -9,21 +9,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from throwcollect.control import (
-    ControllerParameters,
+from throwcollect.control.controller import JointTrajectoryController
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
+from throwcollect.control.values import (
     ErrorCode,
     GoalResult,
     GoalStatus,
-    JointConstraints,
     JointState,
     JointTolerance,
-    JointTrajectoryController,
     Trajectory,
     TrajectoryGoal,
     TrajectoryPoint,
     TrajectoryRefusal,
 )
-from throwcollect.control.parameters import Constraints
 
 JOINTS = ("j1", "j2", "j3")
 START = (1.1, 2.1, 3.1)

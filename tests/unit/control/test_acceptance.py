@@ -8,11 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from throwcollect.control import (
-    ControllerParameters,
-    ErrorCode,
-    GoalStatus,
-)
+from throwcollect.control.parameters import ControllerParameters
+from throwcollect.control.values import ErrorCode, GoalStatus
 
 from .bench import (
     JOINTS,

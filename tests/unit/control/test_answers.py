@@ -8,13 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from throwcollect.control import (
-    ControllerParameters,
-    ErrorCode,
-    GoalStatus,
-    TrajectoryGoal,
-    TrajectoryRefusal,
-)
+from throwcollect.control.parameters import ControllerParameters
+from throwcollect.control.values import ErrorCode, GoalStatus, TrajectoryGoal, TrajectoryRefusal
 
 from .bench import (
     INTEGRATING,

@@ -10,15 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from throwcollect.control import (
-    Constraints,
-    ControllerParameters,
-    JointConstraints,
-    JointTolerance,
-    Trajectory,
-    TrajectoryGoal,
-    TrajectoryPoint,
-)
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
+from throwcollect.control.values import JointTolerance, Trajectory, TrajectoryGoal, TrajectoryPoint
 
 from .bench import JOINTS, PERIOD_NS, TALOS, Bench, Plant, constrain, goal, seconds, through, to
 

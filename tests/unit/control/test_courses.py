@@ -10,12 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from throwcollect.control import (
-    ControllerParameters,
-    ErrorCode,
-    GoalStatus,
-    TrajectoryGoal,
-)
+from throwcollect.control.parameters import ControllerParameters
+from throwcollect.control.values import ErrorCode, GoalStatus, TrajectoryGoal
 
 from .bench import (
     CANCELED,

@@ -6,11 +6,7 @@ import math
 
 import pytest
 
-from throwcollect.control import (
-    Constraints,
-    ControllerParameters,
-    JointConstraints,
-)
+from throwcollect.control.parameters import Constraints, ControllerParameters, JointConstraints
 from throwcollect.errors import ConfigError
 
 

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from throwcollect.control import ControllerParameters, Trajectory, validation
+from throwcollect.control.parameters import ControllerParameters
+from throwcollect.control.values import Trajectory, validation
 
 from .bench import SHIPPED, goal, point, seconds, through, to
 

@@ -5,13 +5,8 @@ import pytest
 from tests.unit.control.bench import through
 
 from throwcollect.config.schema import Config
-from throwcollect.control import (
-    ControllerParameters,
-    GoalStatus,
-    JointConstraints,
-    TrajectoryGoal,
-    TrajectoryPoint,
-)
+from throwcollect.control.parameters import ControllerParameters, JointConstraints
+from throwcollect.control.values import GoalStatus, TrajectoryGoal, TrajectoryPoint
 from throwcollect.robots.description import start_posture
 from throwcollect.robots.talos import TALOS
 from throwcollect.sim.live import LiveSimulator

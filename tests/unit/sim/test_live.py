@@ -7,7 +7,7 @@ from tests.unit.control.bench import through
 
 from throwcollect.config.schema import Config
 from throwcollect.config.values import with_values
-from throwcollect.control import GoalStatus, TrajectoryGoal, TrajectoryPoint
+from throwcollect.control.values import GoalStatus, TrajectoryGoal, TrajectoryPoint
 from throwcollect.engines.engine import BodyState
 from throwcollect.errors import ConfigError, RequestError
 from throwcollect.robots.description import start_posture

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 from throwcollect import ros
-from throwcollect.control import GoalStatus
+from throwcollect.control.values import GoalStatus
 from throwcollect.errors import ConfigError
 from throwcollect.ros.graph_names import Kind, absolute_name, find_interface
 from throwcollect.ros.message_values import fill

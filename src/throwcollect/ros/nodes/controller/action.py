@@ -6,7 +6,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from throwcollect.control import (
+from throwcollect.control.values import (
     ControllerState,
     GoalResult,
     GoalStatus,

@@ -6,7 +6,8 @@ import logging
 import math
 import time
 
-from throwcollect.control import REPEATED, ControllerState
+from throwcollect.control.controller import REPEATED
+from throwcollect.control.values import ControllerState
 from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, provide_time
 from throwcollect.ros.msg import ControllerState as ControllerDescription
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor

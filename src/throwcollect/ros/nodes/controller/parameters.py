@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from throwcollect.control import ControllerParameters
+from throwcollect.control.parameters import ControllerParameters
 from throwcollect.errors import ConfigError
 from throwcollect.ros import Node, Parameter, ParameterDescriptor, SetParametersResult
 from throwcollect.ros.nodes.descriptors import floating_range
