@@ -179,7 +179,7 @@ class TrialCollection:
         if not held:
             self._prefetch.begin(simulation)
         while len(held) < count and (trial := self._leases.lease(simulation, others=self._names)) is not None:
-            self.writer.note("lease", trial=trial, simulation=self._names[simulation])
+            self.writer.note("lease", trial=trial, simulation=self.name_of(simulation))
             held = (*held, trial)
         return held
 
@@ -297,6 +297,11 @@ class TrialCollection:
         if lost is not None:
             raise lost
 
+    def name_of(self, simulation: str) -> str:
+        """Find the name of a simulation's node, even after the simulation has left."""
+        # By default, a simulation lives in a namespace that has the name of its node.
+        return self._names.get(simulation, simulation.strip("/"))
+
     def _note(self, trial: int, outcome: str) -> None:
         self._outcomes[outcome] += 1
         self._prefix.end(trial, succeeded=outcome == self._config.task.success)
@@ -317,7 +322,7 @@ class TrialCollection:
         """Report a trial that is tried again, by another simulation if there is one, or record it as lost."""
         fate = "is tried again" if given_up is None else "is lost"
         self.warn(f"{simulation}: trial {trial} {fate}: {reason}")
-        self.writer.note("fail", trial=trial, simulation=self._names[simulation], reason=reason)
+        self.writer.note("fail", trial=trial, simulation=self.name_of(simulation), reason=reason)
         if given_up is not None:
             self._lose(trial, given_up)
 
