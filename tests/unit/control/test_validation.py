@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from throwcollect.control.parameters import ControllerParameters
 from throwcollect.control import validation
+from throwcollect.control.parameters import ControllerParameters
 from throwcollect.control.values import Trajectory
 
 from .bench import SHIPPED, goal, point, seconds, through, to
