@@ -161,7 +161,7 @@ def test_verify_with_several_processes_gives_the_same_findings(dataset: Path, mo
             super().__init__(processes, *others)
             started.append(processes)
 
-    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Pool)
+    monkeypatch.setattr("throwcollect.side_by_side.futures.ProcessPoolExecutor", Pool)
     in_chunk(dataset)
     alone = verify(dataset, processes=2)
     assert (len(alone), started) == (len(verify(dataset)), [])
