@@ -96,7 +96,7 @@ export class Rosbridge {
   }
 
   #ask(topic, type, period) {
-    this.#send({ op: "subscribe", topic, type, throttle_rate: period });
+    this.#send({ op: "subscribe", topic, type, throttle_rate: period, queue_length: 1 });
   }
 
   #send(message) {

@@ -19,6 +19,7 @@ from throwcollect.ros.connection import Connection
 from throwcollect.ros.graph_names import find_interface, find_offered_qos, full_name, make_own_name
 from throwcollect.ros.router_endpoint import answers
 from throwcollect.serve.rosbridge.codec import Frame, encode, plain_values
+from throwcollect.serve.rosbridge.operations import LEVELS, Level, RequestId
 from throwcollect.units import NS_PER_S
 
 _logger = logging.getLogger(__name__)
@@ -240,11 +241,13 @@ class Client:
 
     Attributes:
         bridge: The bridge that the client is connected to.
+        level: Status messages that the client wants.
         is_closed: Whether the client has left.
     """
 
     def __init__(self, bridge: Bridge, send: Callable[[Frame], None]) -> None:
         self.bridge = bridge
+        self.level: Level = "error"
         self.is_closed = False
         self._send = send
 
@@ -256,3 +259,8 @@ class Client:
     def answer(self, fields: Mapping[str, object], compression: str = "none") -> None:
         """Send an operation; fields that are None are left out."""
         self.send(encode({name: value for name, value in fields.items() if value is not None}, compression))
+
+    def report(self, level: Level, text: str, number: RequestId = None) -> None:
+        """Send a status message about the operation with this id, if the client wants messages of this level."""
+        if LEVELS.index(level) <= LEVELS.index(self.level):
+            self.answer({"op": "status", "id": number, "level": level, "msg": text})

@@ -23,9 +23,12 @@ _T = TypeVar("_T")
 Compression = Literal["none", "cbor", "cbor-raw"]
 """``none`` is JSON. If the subscriptions of a client to a topic differ, the one that comes last here is used."""
 COMPRESSIONS: tuple[Compression, ...] = get_args(Compression)
+Level = Literal["none", "error", "warning", "info"]
+"""Status messages that a client wants; each level includes those before it."""
+LEVELS: tuple[Level, ...] = get_args(Level)
 RequestId = str | int | None
 """The id that a client has given an operation; None if it has given none."""
-MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service"))
+MAY_READ = frozenset(("subscribe", "unsubscribe", "call_service", "fragment", "set_level"))
 """Operations that clients may use that may only look; a call is decided on by its service."""
 Natural = Annotated[int, Field(ge=0, lt=1 << 53)]
 """A number from 0 on that JavaScript can represent."""
@@ -44,12 +47,18 @@ class Operation(BaseModel):
 
 
 class Subscribe(Operation):
-    """Subscribe to a topic, with at least ``throttle_rate`` [ms] between two messages."""
+    """Subscribe to a topic, with at least ``throttle_rate`` [ms] between two messages.
+
+    Meanwhile ``queue_length`` messages wait; text frames are cut into parts of ``fragment_size`` characters, unless it
+    is 0.
+    """
 
     op: Literal["subscribe"]
     topic: str
     type: str = ""
     throttle_rate: NonNegativeFloat = 0
+    queue_length: Natural = 0
+    fragment_size: Natural = 0
     compression: Compression = "none"
 
 
@@ -117,7 +126,32 @@ class Answer(Operation):
     status: int | None = None
 
 
-AnyOperation = Subscribe | Withdraw | Publish | CallService | SendGoal | CancelGoal | Offer | Answer
+class Fragment(Operation):
+    """One part of a frame."""
+
+    op: Literal["fragment"]
+    id: str | int
+    data: str
+    num: Natural
+    total: Natural
+
+    @model_validator(mode="after")
+    def _is_one_of_all(self) -> Fragment:
+        if self.num >= self.total:
+            raise ValueError("num should be below total")
+        return self
+
+
+class SetLevel(Operation):
+    """Choose which status messages the client gets."""
+
+    op: Literal["set_level"]
+    level: Level
+
+
+AnyOperation = (
+    Subscribe | Withdraw | Publish | CallService | SendGoal | CancelGoal | Offer | Answer | Fragment | SetLevel
+)
 _OPERATIONS: TypeAdapter[AnyOperation] = TypeAdapter(Annotated[AnyOperation, Field(discriminator="op")])
 
 

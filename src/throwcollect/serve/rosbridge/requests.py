@@ -12,8 +12,16 @@ from throwcollect.errors import ConfigError, ThrowcollectError
 from throwcollect.serve.rosbridge.advertised import Advertised
 from throwcollect.serve.rosbridge.bridge import Bridge, Client
 from throwcollect.serve.rosbridge.calls import Goals, call_node
-from throwcollect.serve.rosbridge.codec import Frame, read_frame
-from throwcollect.serve.rosbridge.operations import MAY_READ, Arguments, CallService, read_fields, read_operation
+from throwcollect.serve.rosbridge.codec import Frame, Reassembly, read_frame
+from throwcollect.serve.rosbridge.operations import (
+    MAY_READ,
+    Arguments,
+    CallService,
+    Fragment,
+    SetLevel,
+    read_fields,
+    read_operation,
+)
 from throwcollect.serve.rosbridge.rosapi import SET_PARAMETER, make_services
 from throwcollect.serve.rosbridge.topics import Publishers, Subscriptions
 
@@ -37,6 +45,7 @@ class Requests(Client):
         super().__init__(bridge, send)
         self._read_only = read_only
         self._inbox: deque[Frame] = deque()
+        self._reassembly = Reassembly()
         self._services = make_services(self)
         topics, publishers, goals = Subscriptions(self), Publishers(self), Goals(self)
         services, actions = Advertised(self, "srv"), Advertised(self, "action")
@@ -58,6 +67,8 @@ class Requests(Client):
             "action_feedback": actions.take,
             "action_result": actions.take,
             "action_status": actions.take,
+            "fragment": self._add_fragment,
+            "set_level": self._set_level,
         }
 
     @property
@@ -130,7 +141,7 @@ class Requests(Client):
             case "send_action_goal":
                 self.answer({"op": "action_result", "action": fields.get("action"), "status": _UNKNOWN, **failure})
             case _:
-                self.answer({"op": "status", "id": number, "level": "error", "msg": sentence})
+                self.report("error", sentence, number)
 
     async def _call_service(self, asked: CallService) -> None:
         name = asked.name.lstrip("/")
@@ -150,3 +161,11 @@ class Requests(Client):
     def _require_writing(self, what: str) -> None:
         if self._read_only:
             raise ConfigError(f"{what}: this client may only look", expected="the token of those who may act")
+
+    async def _add_fragment(self, part: Fragment) -> None:
+        frame = self._reassembly.add(part)
+        if frame is not None:
+            await self._carry_out(frame)
+
+    def _set_level(self, asked: SetLevel) -> None:
+        self.level = asked.level

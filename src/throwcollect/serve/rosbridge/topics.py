@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -10,6 +11,7 @@ from throwcollect import ros
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
 from throwcollect.serve.rosbridge.bridge import Client, Sample
+from throwcollect.serve.rosbridge.codec import cut
 from throwcollect.serve.rosbridge.guarded import open_topic
 from throwcollect.serve.rosbridge.operations import COMPRESSIONS, Publish, RequestId, Subscribe, Withdraw
 
@@ -19,7 +21,7 @@ _HEADER = "std_msgs/Header"
 
 
 class RateLimit:
-    """Lets samples through to `send` at intervals: of those that come meanwhile, the newest, when its time has come.
+    """Lets samples through to `send` at intervals: of those that come meanwhile, the newest wait in a queue.
 
     `later` calls an action after a time [s].
     """
@@ -27,43 +29,46 @@ class RateLimit:
     def __init__(self, send: Callable[[Sample], None], later: Callable[[float, Callable[[], None]], None]) -> None:
         self._send = send
         self._later = later
-        self._newest: Sample | None = None
+        self._queue: deque[Sample] = deque(maxlen=0)
         self._interval_s = 0.0
         self._due = 0.0
 
-    def change(self, interval_s: float) -> None:
-        """Use another interval from now on; a shorter one takes effect at once."""
+    def change(self, interval_s: float, queue_length: int) -> None:
+        """Use another interval and queue from now on; a shorter interval takes effect at once."""
         now = time.monotonic()
+        self._queue = deque(self._queue, maxlen=queue_length)
         self._interval_s = interval_s
         self._due = min(self._due, now + interval_s)
         self._later(max(self._due - now, 0.0), self._continue)
 
     def offer(self, sample: Sample) -> None:
-        """Send a sample, or keep it until it is due."""
+        """Send a sample, keep it until it is due, or leave it out."""
         now = time.monotonic()
-        if self._newest is None and now >= self._due:
+        if not self._queue and now >= self._due:
             self._let_through(sample, now)
-            return
-        if self._newest is None:
-            self._later(self._due - now, self._continue)
-        self._newest = sample
+        elif self._queue.maxlen:
+            if not self._queue:
+                self._later(self._due - now, self._continue)
+            self._queue.append(sample)
 
     def clear(self) -> None:
-        """Forget the sample that waits; a timer that still runs then finds none."""
-        self._newest = None
+        """Forget the samples that wait; a timer that still runs then finds none."""
+        self._queue.clear()
 
     def _let_through(self, sample: Sample, now: float) -> None:
-        # Samples are sent at even intervals, so the next interval begins when this sample was due, and not at `now`, as
-        # the timer may be late.
-        self._due = (self._due if now - self._due < self._interval_s else now) + self._interval_s
+        # Samples of a queue are sent at even intervals, so the next interval begins when this sample was due, and not
+        # at `now`, as the timer may be late.
+        is_late = now - self._due < self._interval_s and self._queue.maxlen
+        self._due = (self._due if is_late else now) + self._interval_s
         self._send(sample)
 
     def _continue(self) -> None:
         now = time.monotonic()
         # A timer of an earlier interval may come too soon; the sample then has a later timer.
-        if self._newest is not None and now >= self._due - _EARLY_S:
-            sample, self._newest = self._newest, None
-            self._let_through(sample, now)
+        if self._queue and now >= self._due - _EARLY_S:
+            self._let_through(self._queue.popleft(), now)
+            if self._queue:
+                self._later(self._due - now, self._continue)
 
 
 class SubscribedTopic:
@@ -103,10 +108,12 @@ class SubscribedTopic:
     def _merge(self) -> None:
         asked = self._asked.values()
         self._compression = max((each.compression for each in asked), key=COMPRESSIONS.index)
-        self._pace.change(min(each.throttle_rate for each in asked) / 1000)
+        self._fragment_size = min((each.fragment_size for each in asked if each.fragment_size), default=0)
+        self._pace.change(min(each.throttle_rate for each in asked) / 1000, max(each.queue_length for each in asked))
 
     def _send(self, sample: Sample) -> None:
-        self._client.send(sample.frame(self._given, self._compression))
+        for part in cut(sample.frame(self._given, self._compression), self._fragment_size):
+            self._client.send(part)
 
 
 class Subscriptions:
@@ -168,6 +175,8 @@ class Publishers:
         if topic in self._publishers:
             _, publisher = self._publishers.pop(topic)
             self._client.bridge.node.destroy_publisher(publisher)
+        else:
+            self._client.report("warning", f"unadvertise: {topic} is not advertised", asked.id)
 
     def publish(self, asked: Publish) -> None:
         """Publish a message; a topic that the client has not announced, but others have, is announced first."""

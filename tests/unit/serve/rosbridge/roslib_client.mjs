@@ -11,6 +11,7 @@ const told = {};
 const topics = await new Promise((resolve, reject) => ros.getTopics(resolve, reject));
 told.type = topics.types[topics.topics.indexOf("/words")];
 told.nodes = await new Promise((resolve, reject) => ros.getNodes(resolve, reject));
+told.details = await new Promise((resolve, reject) => ros.getMessageDetails("sensor_msgs/JointState", resolve, reject));
 
 for (const compression of ["none", "cbor"]) {
   const states = new Topic({ ros, name: "/states", messageType: "sensor_msgs/JointState", compression });

@@ -21,9 +21,17 @@ from rclzenoh.interfaces import deserialize, message_class, serialize
 from rclzenoh.interfaces.catalog import INTERFACES
 from throwcollect.errors import ConfigError
 from throwcollect.ros.message_values import fill
-from throwcollect.serve.rosbridge.bridge import Sample
-from throwcollect.serve.rosbridge.codec import encode, json_text, plain_values, read_frame
-from throwcollect.serve.rosbridge.operations import read_operation
+from throwcollect.serve.rosbridge.bridge import Bridge, Sample
+from throwcollect.serve.rosbridge.codec import (
+    LONGEST_FRAME,
+    Reassembly,
+    cut,
+    encode,
+    json_text,
+    plain_values,
+    read_frame,
+)
+from throwcollect.serve.rosbridge.operations import Fragment, read_operation
 
 
 @cache
@@ -93,6 +101,8 @@ def test_truth_values_are_no_numbers(kind: str, value: Any) -> None:
         ('{"op": "png"}', "Input tag 'png' found using 'op' does not match any of the expected tags"),
         ("[" * 100_000, "a frame is no JSON"),
         (b'{"op": "publish", "msg": {}}', "publish.topic: Field required"),
+        ('{"op": "fragment", "id": "a", "num": 1, "total": 1, "data": ""}', "num should be below total"),
+        ('{"op": "set_level", "level": "debug"}', "set_level.level: Input should be 'none', 'error', 'warning' or"),
     ],
 )
 def test_a_malformed_frame_gets_an_error_status(party: Party, frame: str | bytes, said: str) -> None:
@@ -111,3 +121,40 @@ def test_any_frame_is_read_or_refused(frame: str | bytes) -> None:
         read_operation(read_frame(frame))
     except ConfigError:
         return
+
+
+def test_status_messages_come_up_to_the_requested_level(party: Party) -> None:
+    for level in ("none", "error", "warning"):
+        party.ask(op="set_level", level=level)
+        party.ask(op="nothing", id=level)
+        party.ask(op="unadvertise", id=level, topic="/x")
+    party.call("rosapi/get_time")
+    told = [(each["id"], each["level"]) for each in party.got() if each["op"] == "status"]
+    assert told == [("error", "error"), ("warning", "error"), ("warning", "warning")]
+
+
+def test_fragments_in_any_order_become_a_frame(bridge: Bridge) -> None:
+    reader = Party(bridge, read_only=True)
+    frame = json_text({"op": "call_service", "id": "whole", "service": "/rosapi/get_ros_version"})
+    parts = list(cut(frame, 7))
+    for each in [*parts[::-2], parts[-1]]:
+        reader.client.receive(each)
+    reader.call("rosapi/get_time")
+    assert "whole" not in [each["id"] for each in reader.got()]
+    for each in parts:
+        reader.client.receive(each)
+    assert reader.next(id="whole")["values"]["version"] == 2
+    reader.client.close()
+
+
+def test_parts_of_a_frame_that_are_too_long_together_are_rejected() -> None:
+    whole, half = Reassembly(), "x" * (LONGEST_FRAME // 2)
+
+    def add(number: int, total: int, data: str, name: str = "a") -> str | None:
+        return whole.add(Fragment(op="fragment", id=name, num=number, total=total, data=data))
+
+    assert add(0, 2, half) is None
+    with pytest.raises(ConfigError, match=f"should have at most {LONGEST_FRAME} characters"):
+        add(0, 2, half, name="b")
+    assert add(1, 2, "y") == f"{half}y"
+    assert add(0, 2, "x" * (LONGEST_FRAME - 100)) is None

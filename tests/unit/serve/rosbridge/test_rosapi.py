@@ -52,6 +52,9 @@ def test_rosapi_lists_topics_with_types_and_without_hidden_ones(party: Party, gr
     assert party.call("/rosapi/topic_type", topic="states") == {"type": "sensor_msgs/msg/JointState"}
     assert party.call("/rosapi/topic_type", topic="/none") == {"type": ""}
     assert party.call("/rosapi/topics_for_type", type="sensor_msgs/JointState") == {"topics": ["/states"]}
+    assert party.call("/rosapi/publishers", topic="/states") == {"publishers": ["/other"]}
+    assert party.call("/rosapi/publishers", topic="/orders") == {"publishers": []}
+    assert party.call("/rosapi/subscribers", topic="/orders") == {"subscribers": ["/other"]}
 
 
 def test_rosapi_lists_services_with_types_and_nodes(party: Party, graph: Node) -> None:
@@ -61,6 +64,11 @@ def test_rosapi_lists_services_with_types_and_nodes(party: Party, graph: Node) -
     assert party.call("/rosapi/services_for_type", type="std_srvs/SetBool") == {"services": ["/lamp"]}
     assert party.call("/rosapi/service_type", service="/lamp") == {"type": "std_srvs/srv/SetBool"}
     assert party.call("/rosapi/service_type", service="/none") == {"type": ""}
+    assert party.call("/rosapi/service_providers", service="lamp") == {"providers": ["/other"]}
+    assert party.call("/rosapi/service_providers", service="std_srvs/srv/SetBool") == {"providers": ["/other"]}
+    assert party.call("/rosapi/service_providers", service="std_srvs/Trigger") == {"providers": []}
+    assert party.call("/rosapi/service_node", service="/lamp") == {"node": "/other"}
+    assert party.call("/rosapi/service_node", service="/none") == {"node": ""}
 
 
 def test_rosapi_lists_nodes_with_their_topics_and_services(party: Party, graph: Node) -> None:
@@ -72,6 +80,33 @@ def test_rosapi_lists_nodes_with_their_topics_and_services(party: Party, graph: 
     assert "/lamp" in details["services"]
     empty: dict[str, list[str]] = {"subscribing": [], "publishing": [], "services": []}
     assert party.call("/rosapi/node_details", node="/gone") == empty
+
+
+def test_rosapi_describes_a_type_with_all_nested_types(party: Party) -> None:
+    first, *others = party.call("/rosapi/message_details", type="sensor_msgs/JointState")["typedefs"]
+    assert first == {
+        "type": "sensor_msgs/JointState",
+        "fieldnames": ["header", "name", "position", "velocity", "effort"],
+        "fieldtypes": ["std_msgs/Header", "string", "double", "double", "double"],
+        "fieldarraylen": [-1, 0, 0, 0, 0],
+        "examples": ["{}", "[]", "[]", "[]", "[]"],
+        "constnames": [],
+        "constvalues": [],
+    }
+    assert [each["type"] for each in others] == ["std_msgs/Header", "builtin_interfaces/Time"]
+    (request,) = party.call("/rosapi/service_request_details", type="std_srvs/SetBool")["typedefs"]
+    assert (request["type"], request["fieldnames"], request["examples"]) == (
+        "std_srvs/SetBool_Request",
+        ["data"],
+        ["False"],
+    )
+    (response,) = party.call("/rosapi/service_response_details", type="std_srvs/srv/SetBool")["typedefs"]
+    assert response["fieldtypes"] == ["boolean", "string"]
+    (field,) = party.call("/rosapi/message_details", type="sensor_msgs/PointField")["typedefs"]
+    assert dict(zip(field["constnames"], field["constvalues"], strict=True))["FLOAT64"] == "8"
+    pose = party.call("/rosapi/message_details", type="geometry_msgs/PoseWithCovariance")["typedefs"]
+    assert pose[0]["fieldarraylen"] == [-1, 36]
+    assert "no_msgs/No" in party.call("/rosapi/message_details", type="no_msgs/No")
 
 
 def test_parameters_are_listed_read_and_set(party: Party, graph: Node) -> None:

@@ -31,6 +31,7 @@ def test_roslib_hears_speaks_calls_offers_and_sends_goals(program: Path, url: st
     told = json.loads(found.stdout)
     assert told["type"] == "std_msgs/msg/String"
     assert told["nodes"] == ["/other"]
+    assert told["details"][0]["type"] == "sensor_msgs/JointState"
     assert told["none"] == ["Array", [1.5]]
     assert told["cbor"] == ["Float64Array", [1.5]]
     assert told["lamp"] == {"success": True, "message": "switched"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import threading
 import time
@@ -87,27 +88,38 @@ def test_each_subscription_of_a_client_ends_by_its_id(party: Party, node: Node) 
     assert data(party) == ["a"]
 
 
-def test_the_lowest_throttle_of_a_client_counts(party: Party, node: Node) -> None:
+def test_the_lowest_throttle_and_the_longest_queue_of_a_client_count(party: Party, node: Node) -> None:
     say = words(node)
     party.ask(op="subscribe", id="slow", topic="/words", type="std_msgs/String", throttle_rate=60_000)
     say("a", "b", "c")
     party.next(msg={"data": "a"})
+    party.ask(op="subscribe", id="queue", topic="/words", throttle_rate=60_000, queue_length=2)
+    party.call("rosapi/get_time")
+    say(*"defgh")
+    party.call("rosapi/get_time")
+    assert data(party) == ["a"]
+    # Messages that wait come when the shorter interval is over.
     party.ask(op="subscribe", id="fast", topic="/words", throttle_rate=1)
-    # The newest message that waits comes when the shorter interval is over.
-    party.next(msg={"data": "c"})
+    party.next(msg={"data": "h"})
+    assert data(party) == ["a", "g", "h"]
     party.ask(op="unsubscribe", id="fast", topic="/words")
+    party.ask(op="unsubscribe", id="queue", topic="/words")
+    party.call("rosapi/get_time")
     say("i", "j")
     party.call("rosapi/get_time")
-    assert data(party)[-1] in "ci"
+    assert data(party)[3:] in ([], ["i"])
 
 
-def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("queue_length", "rate"), [(0, 25), (1, 30), (3, 30)])
+def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(
+    monkeypatch: pytest.MonkeyPatch, queue_length: int, rate: int
+) -> None:
     now = 100.0
     monkeypatch.setattr(topics, "time", SimpleNamespace(monotonic=lambda: now))
     waiting: list[tuple[float, Callable[[], None]]] = []
     sent: list[float] = []
     pace = RateLimit(lambda _: sent.append(now), lambda seconds, action: waiting.append((now + seconds, action)))
-    pace.change(0.033)
+    pace.change(0.033, queue_length)
     sample: Any = "sample"
     for number in range(60 * 50):
         arrives = 100.0 + number * 0.02
@@ -116,7 +128,20 @@ def test_a_throttle_of_33_ms_passes_30_of_50_messages_a_second(monkeypatch: pyte
             action()
         now = arrives
         pace.offer(sample)
-    assert len(sent) == pytest.approx(1800, abs=60)
+    assert len(sent) == pytest.approx(60 * rate, abs=60)
+
+
+def test_a_long_message_comes_in_fragments_of_the_requested_size(party: Party, node: Node) -> None:
+    say = words(node)
+    party.ask(op="subscribe", id="whole", topic="/words", type="std_msgs/String")
+    party.ask(op="subscribe", id="cut", topic="/words", fragment_size=100)
+    party.call("rosapi/get_time")
+    say("ä" * 1000, "short")
+    party.next(msg={"data": "short"})
+    parts = [each for each in party.got() if each["op"] == "fragment"]
+    assert {len(each["data"]) for each in parts[:-1]} == {100}
+    assert {(each["total"], each["id"]) for each in parts} == {(len(parts), parts[0]["id"])}
+    assert json.loads("".join(each["data"] for each in parts))["msg"] == {"data": "ä" * 1000}
 
 
 def test_messages_come_as_cbor_with_typed_arrays_or_as_raw_bytes(party: Party, node: Node) -> None:
