@@ -103,6 +103,8 @@ def test_impostor_simulations_do_not_change_the_dataset(graph: ros.Context, tmp_
     said = ended.stdout + ended.stderr
     assert "/forger: an episode is dropped: episode: is not signed with the key of this run" in said
     assert "its episode is refused: its configuration is another one" in said
+    for name in ("refuser", "other"):
+        assert f"/{name}: gets no more trials, because it refused trials that other simulations could do" in said
 
 
 def forge_message(directory: Path, path: Path) -> bytes:

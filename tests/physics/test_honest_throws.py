@@ -9,9 +9,8 @@ import pytest
 
 from throwcollect.collect.coordinator.prepare import draw_plan
 from throwcollect.config.schema import Config
-from throwcollect.dataset.throws_table import judge_episode
+from throwcollect.dataset.verify_recording import find_flight_problems
 from throwcollect.sim.simulator import Simulator
-from throwcollect.tasks.throw.flight import BALLISTIC_TOLERANCE_M
 
 ALL_TOPICS = ["joint_states", "ball/odometry", "controller_state", "tf", "clock"]
 GENTLE = {"task.duration_s": 2.0, "task.end.arm_right_4_joint": -1.6}
@@ -68,5 +67,4 @@ def test_the_flight_of_a_simulated_throw_is_ballistic(name: str, tmp_path: Path)
     assert run
     for trial in run:
         planned = plan.trials[trial]
-        residual_m = judge_episode(plan.config_of(planned), simulator.run(planned)).ballistic_residual_m
-        assert residual_m is None or residual_m <= BALLISTIC_TOLERANCE_M, trial
+        assert list(find_flight_problems(simulator.run(planned), plan.config_of(planned))) == [], trial

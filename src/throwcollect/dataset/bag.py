@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.composer import Composer, ComposerError
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.events import AliasEvent
 
 from rclzenoh.interfaces import type_hash
 from throwcollect.config.document import explain_yaml_error
@@ -96,8 +98,18 @@ def bag_information(
     }
 
 
+class _PlainComposer(Composer):
+    """Refuses aliases, with which a short text can expand without limit."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.parser.peek_event()
+        if isinstance(event, AliasEvent):
+            raise ComposerError(problem="an alias", problem_mark=event.start_mark)
+        return super().compose_node(parent, index)
+
+
 def from_yaml(path: Path) -> Mapping[str, Any]:
-    """Read a YAML file such as `to_yaml` makes: one mapping."""
+    """Read a YAML file such as `to_yaml` makes: one mapping, without aliases."""
     try:
         document = _parse(read_text(path, most_bytes=_MOST_BYTES))
     except (YAMLError, RecursionError, ValueError) as error:
@@ -111,7 +123,9 @@ def from_yaml(path: Path) -> Mapping[str, Any]:
 @lru_cache(maxsize=8)
 def _parse(text: str) -> Any:
     """Parse YAML; the last strings are cached, because one command reads the metadata of a dataset several times."""
-    return YAML(typ="safe", pure=True).load(text)
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Composer = _PlainComposer
+    return yaml.load(text)
 
 
 def read_bag_metadata(directory: Path) -> Mapping[str, Any]:
@@ -143,7 +157,7 @@ def to_yaml(data: Mapping[str, Any]) -> str:
     yaml = YAML()
     # By default, long values would be broken at 80 characters.
     yaml.width = 4096
-    # A value that occurs twice, such as an infinite duration, would be an alias, which rosbag2 does not write.
+    # A value that occurs twice, such as an infinite duration, would be an alias, which `from_yaml` refuses.
     yaml.representer.ignore_aliases = lambda *_: True
     stream = io.StringIO()
     yaml.dump(data, stream)

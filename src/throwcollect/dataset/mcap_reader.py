@@ -7,6 +7,7 @@ behind them.
 
 from __future__ import annotations
 
+import errno
 import io
 import mmap
 import os
@@ -34,6 +35,8 @@ from throwcollect.files import open_regular, unreadable
 from throwcollect.plan.digest import is_digest
 
 _RECORD_PREFIX = struct.Struct("<BQ")
+_EFFORT = 64
+"""Most bytes that are read in vain for each byte of the file; only a file that was made to be slow needs more."""
 
 
 class McapRecord(NamedTuple):
@@ -52,16 +55,22 @@ class WholeEpisode(NamedTuple):
 
 
 class McapContents:
-    """The bytes of a whole file, read record by record."""
+    """The bytes of a whole file, read record by record.
+
+    Attributes:
+        effort: How much was read and decompressed so far [bytes]; what was read again counts again.
+    """
 
     def __init__(self, data: mmap.mmap | bytes) -> None:
         self._data = data
+        self.effort = 0
 
     def __len__(self) -> int:
         return len(self._data)
 
     def slice(self, start: int, end: int) -> bytes:
         """Return the bytes of the file from `start` to `end`, not included."""
+        self.effort += end - start
         return self._data[start:end]
 
     def record(self, offset: int) -> McapRecord:
@@ -136,6 +145,7 @@ class McapContents:
         """Read the episode whose chunk begins at an offset, and compare all its bytes with what the writer writes."""
         episode, end = self.episode(offset, sensors=True)
         episode.chunk.check_size()
+        self.effort += episode.chunk.uncompressed_size
         episode.chunk.check_records()
         for chunk in episode.sensors:
             check_frames(chunk)
@@ -145,14 +155,31 @@ class McapContents:
         return WholeEpisode(episode, replace(run, data=b"", offset=offset))
 
 
+def _measure(descriptor: int) -> int:
+    """Find how much of a file is to be read [bytes]: holes, which give zeros, only up to the size of the data."""
+    size, written, end = os.fstat(descriptor).st_size, 0, 0
+    try:
+        while end < size:
+            start = os.lseek(descriptor, end, os.SEEK_DATA)
+            end = os.lseek(descriptor, start, os.SEEK_HOLE)
+            written += end - start
+    except OSError as error:
+        # No data follow. With any other error, the file system does not know where its holes are.
+        if error.errno != errno.ENXIO:
+            return size
+    # One byte more shows that data and file do not end together.
+    return min(size, 2 * written + 1)
+
+
 @contextmanager
 def open_mcap(path: Path) -> Iterator[McapContents]:
-    """Map a file into memory while the block lasts, whatever it contains."""
+    """Map a file into memory while the block lasts, whatever it contains; one of holes only up to twice its data."""
     try:
         descriptor = open_regular(path)
         try:
+            size = _measure(descriptor)
             # An empty file cannot be mapped.
-            data = mmap.mmap(descriptor, 0, access=mmap.ACCESS_READ) if os.fstat(descriptor).st_size else b""
+            data = mmap.mmap(descriptor, size, access=mmap.ACCESS_READ) if size else b""
         finally:
             # The mapping keeps the file open.
             os.close(descriptor)
@@ -206,11 +233,14 @@ def scan(contents: McapContents) -> Iterator[WholeEpisode]:
     Args:
         contents: The contents of an MCAP file or of its beginning, finished or not.
     """
+    effort = _EFFORT * len(contents)
     offset = contents.next_chunk(0)
-    while offset >= 0:
+    while offset >= 0 and effort > 0:
+        before = contents.effort
         try:
             found = contents.whole_episode(offset)
         except DatasetError:
+            effort -= contents.effort - before
             offset = contents.next_chunk(offset + 1)
             continue
         yield found

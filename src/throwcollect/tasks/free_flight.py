@@ -49,6 +49,23 @@ def ballistic_positions(
     return np.array(path)
 
 
+def ballistic_steps(
+    position: NDArray[np.float64], velocity: NDArray[np.float64], *, steps: int, config: Config
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute positions and velocities of many balls, each of shape ``(n, 3)``, after some steps of free flight.
+
+    Arithmetic and arguments are as in `ballistic_positions`.
+    """
+    dt, drag_per_m = 1 / config.sim.physics_hz, _drag_per_m(config)
+    gravity = np.array([0.0, 0.0, -config.scene.gravity_mps2])
+    for _ in range(steps):
+        vx, vy, vz = velocity.T
+        braking = (drag_per_m * np.sqrt(vx * vx + vy * vy + vz * vz))[:, np.newaxis]
+        velocity = velocity + (gravity - braking * velocity) * dt
+        position = position + velocity * dt
+    return position, velocity
+
+
 def _drag_per_m(config: Config) -> float:
     """Compute the ball's deceleration by the air over the square of its speed [1/m]."""
     if config.acted_on != BALL:

@@ -156,7 +156,8 @@ def zstd_bomb(directory: Path) -> None:
 
 
 def yaml_aliases(directory: Path) -> None:
-    lines = ["a0: &a0 [x, x]", *(f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 12))]
+    # A merge copies what it names.
+    lines = ["a0: &a0 {x: 1}", *(f"a{n}: &a{n} {{<<: [{', '.join([f'*a{n - 1}'] * 9)}]}}" for n in range(1, 12))]
     (directory / "metadata.yaml").write_text("\n".join([*lines, "rosbag2_bagfile_information: {version: *a11}"]))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from tests.unit.dataset.mutations import Mutation, any_mutation, mutate
 
 from throwcollect.dataset.mcap_reader import WholeEpisode, open_mcap, scan_file
+from throwcollect.episode.chunk import Chunk
 
 SHARD = "quick_00001.mcap"
 
@@ -73,6 +75,28 @@ def test_a_recording_cut_anywhere_has_the_episodes_before_the_cut(
 def test_a_file_of_noise_has_no_episode(path: Path) -> None:
     assert find_in(path, np.random.default_rng(0).bytes(100_000)) == []
     assert find_in(path, b"") == []
+
+
+@pytest.mark.parametrize("behind", ["", "message indexes"])
+def test_a_scan_of_nested_chunks_gives_up_before_it_takes_quadratic_time(
+    path: Path, monkeypatch: pytest.MonkeyPatch, behind: str
+) -> None:
+    """Each header begins a chunk that reaches to the end of all headers, and perhaps to many empty records."""
+    size, count = len(Chunk(b"", 0, 0, 0, 0).record()), 3000
+    headers = [Chunk(bytes(size * each), 0, 0, 0, 0).record()[:size] for each in reversed(range(count))]
+    parse, parsed = Chunk.parse, []
+    monkeypatch.setattr(Chunk, "parse", lambda record: parsed.append(len(record)) or parse(record))
+    indexes = b"\x07" + bytes(8)
+    assert find_in(path, b"".join(headers) + indexes * 5_000 * bool(behind)) == []
+    assert 60 <= len(parsed) <= 200
+
+
+def test_a_file_of_holes_is_read_up_to_twice_its_data(path: Path, whole: bytes) -> None:
+    assert find_in(path, whole) == [3, 4, 5]
+    os.truncate(path, 1 << 40)
+    with open_mcap(path) as contents:
+        assert len(whole) < len(contents) < 3 * len(whole)
+    assert [each.episode.header.trial for each in scan_file(path)] == [3, 4, 5]
 
 
 def test_an_episode_with_changed_samples_and_a_fitting_crc_is_not_found(

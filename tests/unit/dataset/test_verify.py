@@ -178,6 +178,11 @@ def kick_ball(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Episode
     return replace(samples, object_position=position), header
 
 
+def forget_contacts(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
+    """The ball stands still in the air, as no contact with the tool is recorded."""
+    return samples, replace(header, contacts=())
+
+
 def late(samples: Samples, header: EpisodeHeader) -> tuple[Samples, EpisodeHeader]:
     """The trial is 1 ns late in its slot of time."""
     header = replace(header, start_ns=header.start_ns + 1)
@@ -193,7 +198,8 @@ def spoil_effort(samples: Samples, header: EpisodeHeader) -> tuple[Samples, Epis
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        (kick_ball, "its flight departs from ballistic motion by"),
+        (kick_ball, "the ball departs from ballistic motion by"),
+        (forget_contacts, "the ball departs from ballistic motion by"),
         (late, "the trial's slot of time"),
         (spoil_effort, "effort holds numbers that are not finite, first in sample 40"),
     ],

@@ -204,7 +204,8 @@ class TrialCollection:
             return False
         self._agreed.add(simulation)
         self._prefetch.end(simulation)
-        self._leases.complete(simulation, trial)
+        for refuser in self._leases.complete(simulation, trial):
+            self.warn(f"{refuser}: gets no more trials, because it refused trials that other simulations could do")
         self.writer.append(episode, result)
         self._note(trial, result["outcome"])
         return True

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from itertools import chain
@@ -33,7 +34,8 @@ class Leases:
     because a trial yields the same wherever it is done.
 
     Some trials are refused by every simulation, and some simulations refuse every trial. So a simulation that refuses
-    several trials in a row is doubted: as long as there are others, these get the trials.
+    several trials in a row is doubted: as long as there are others, these get the trials. It is set aside for good when
+    others could do several of the trials that it refused.
 
     Args:
         trials: Numbers of the trials to do.
@@ -59,6 +61,8 @@ class Leases:
         """Trials that simulations held which are out of sight, and may come back alive."""
         self._refusals: dict[str, list[tuple[int, str]]] = {}
         """Trials that a simulation has refused since it could do one, with the reasons."""
+        self._wrong_refusals = Counter[str]()
+        """How many of these another simulation could do."""
         self.total = 0
         self.ended = 0
         self._completed = 0
@@ -103,7 +107,7 @@ class Leases:
         rivals: list[str] = []
         if self._returned or self._refusals:
             rivals = [other for other in others if other != simulation and not self._is_doubted(other)]
-        if rivals and self._is_doubted(simulation):
+        if self._wrong_refusals[simulation] >= _MOST_IN_A_ROW or (rivals and self._is_doubted(simulation)):
             return None
         trial = next((trial for trial in sorted(self._returned) if self._may_try(simulation, trial, rivals)), None)
         if trial is not None:
@@ -121,8 +125,12 @@ class Leases:
         self._take_fresh(trial)
         self._end(trial)
 
-    def complete(self, simulation: str, trial: int) -> None:
-        """Note that a simulation has done an open trial, which it may hold, or have held before."""
+    def complete(self, simulation: str, trial: int) -> list[str]:
+        """Note that a simulation has done an open trial, which it may hold, or have held before.
+
+        Returns:
+            The simulations that are set aside now, because they refused this trial and others.
+        """
         # Nearly always, the simulation itself holds the trial.
         holder = next((name for name in chain((simulation,), self._held) if trial in self._held.get(name, ())), None)
         if holder is not None:
@@ -132,8 +140,11 @@ class Leases:
         else:
             self._take_fresh(trial)
         self._end(trial)
-        self._refusals.pop(simulation, None)
+        self.forget(simulation)
         self._completed += 1
+        wrong = [name for name, refused in self._refusals.items() if trial in dict(refused)]
+        self._wrong_refusals.update(wrong)
+        return [name for name in wrong if self._wrong_refusals[name] == _MOST_IN_A_ROW]
 
     def fail(
         self, simulation: str, trial: int, reason: str, *, refused: bool = False, alive: bool | None = False
@@ -191,6 +202,7 @@ class Leases:
     def forget(self, simulation: str) -> None:
         """Forget the refusals of a simulation that is gone; a later one of the same name is a different one."""
         self._refusals.pop(simulation, None)
+        self._wrong_refusals.pop(simulation, None)
 
     def _is_doubted(self, simulation: str) -> bool:
         return len(self._refusals.get(simulation, ())) >= _MOST_IN_A_ROW

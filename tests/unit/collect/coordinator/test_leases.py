@@ -144,7 +144,8 @@ def test_a_simulation_that_refuses_every_trial_gets_no_more_and_loses_none() -> 
     leases = Leases(range(60), retries=3)
     assert do_all(leases) == []
     leases.add([60])
-    assert leases.lease("hole", others=BOTH) is None
+    # Even alone, it cannot spoil trials.
+    assert leases.lease("hole", others=["hole"]) is None
     leases.forget("hole")
     assert leases.lease("hole", others=BOTH) == 60
 
@@ -178,6 +179,8 @@ def test_trials_that_every_simulation_refuses_keep_no_simulation_from_others() -
             else:
                 leases.complete(name, trial)
     assert sorted(lost) == list(range(1, 20))
+    leases.add([30])
+    assert leases.lease("a", others="a") == 30
 
 
 def test_a_collection_is_hopeless_once_every_simulation_only_refuses_trials() -> None:
