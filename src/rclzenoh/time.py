@@ -1,4 +1,4 @@
-"""Times, timers, and the clocks of nodes."""
+"""Times, durations, timers, and the clock of ROS time: the simulation's time if it provides one, or the system's."""
 
 from __future__ import annotations
 
@@ -11,6 +11,24 @@ from rclzenoh.interfaces.msg import Time as TimeMessage
 
 S_TO_NS = 1_000_000_000
 """Nanoseconds in a second."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Duration:
+    """Period of time.
+
+    Attributes:
+        nanoseconds: Its length [ns].
+    """
+
+    nanoseconds: int = 0
+
+    def __str__(self) -> str:
+        return "Infinite" if self == Infinite else f"{self.nanoseconds} nanoseconds"
+
+
+Infinite = Duration(nanoseconds=2**63 - 1)
+"""The longest duration, which stands for no limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
