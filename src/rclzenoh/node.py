@@ -67,7 +67,7 @@ class Node(NodeBase, NodeParameters):
         self.add_on_set_parameters_callback(_refuse_simulated_time)
         self.declare_parameter(_USE_SIM_TIME, False)
         if start_parameter_services:
-            for service, name, field, find in self.parameter_services():
+            for service, name, field, find in self.parameter_services(self._logger.warning):
                 answer = partial(_answer, field, find)
                 self.create_service(service, f"~/{name}", answer, qos_profile=qos_profile_parameters)
         if is_taken:

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import rclzenoh.context
 from rclzenoh.action.client import ActionClient, get_action_names_and_types
 from rclzenoh.action.server import ActionServer, CancelResponse, GoalResponse
@@ -13,6 +15,7 @@ from rclzenoh.executors import Executor, SingleThreadedExecutor
 from rclzenoh.interfaces import deserialize as deserialize_message
 from rclzenoh.interfaces import get_action, get_message, get_service
 from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclzenoh.logging import LoggingSeverity
 from rclzenoh.node import Node
 from rclzenoh.parameter import Parameter, parameter_value_to_python
 from rclzenoh.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -53,6 +56,12 @@ def graph_changes(node: Node) -> int:
 
 def let_callbacks_wait(_node: Node) -> None:
     """Let a node go on with other callbacks while one of its coroutines waits; on this backend, all nodes do so."""
+
+
+def pass_on_log(node: Node, record: logging.LogRecord) -> None:
+    """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
+    place = (record.pathname, record.funcName or "", record.lineno)
+    node.get_logger().log_from(place, record.getMessage(), LoggingSeverity(record.levelno))
 
 
 def provide_time(node: Node) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import os
 import threading
 import traceback
@@ -192,6 +193,19 @@ def _is_of_request(error: BaseException) -> bool:
     """
     modules = [frame.f_globals.get("__name__", "") for frame, _ in traceback.walk_tb(error.__traceback__)]
     return isinstance(error, ValueError) and not any(name.startswith("throwcollect.") for name in modules)
+
+
+def pass_on_log(node: Node, record: logging.LogRecord) -> None:
+    """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
+    # The node's logger would give this line as the place of the record.
+    rclpy_implementation.rclpy_logging_rcutils_log(
+        record.levelno,
+        node.get_logger().name,
+        record.getMessage(),
+        record.funcName,
+        record.pathname,
+        record.lineno,
+    )
 
 
 def provide_time(node: Node) -> None:
