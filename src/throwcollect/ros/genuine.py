@@ -211,13 +211,15 @@ def pass_on_log(node: Node, record: logging.LogRecord) -> None:
 def provide_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``.
 
-    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``.
+    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``, and
+    the time of the system afterwards.
     """
     # rclpy's own time source does it like this; there is no public function for it.
     node.get_clock()._set_ros_time_is_active(True)
-    node.add_on_set_parameters_callback(_refuse_simulated_time)
+    node.add_on_set_parameters_callback(_refuse_other_time)
 
 
-def _refuse_simulated_time(parameters: list[Parameter]) -> SetParametersResult:
-    refused = any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters)
-    return SetParametersResult(successful=not refused, reason="use_sim_time: this node does not follow /clock")
+def _refuse_other_time(parameters: list[Parameter]) -> SetParametersResult:
+    if any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters):
+        return SetParametersResult(successful=False, reason="use_sim_time: this node makes its time itself")
+    return SetParametersResult(successful=True)
