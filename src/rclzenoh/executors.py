@@ -109,9 +109,11 @@ class Executor:
 
     def _find_next_timer(self) -> tuple[Timer | None, float]:
         """The timer that is due first, and the time until then [s]."""
-        timers = [timer for node in self._nodes for timer in node.timers]
-        first = min(timers, key=Timer.time_until_next_call, default=None)
-        return first, float("inf") if first is None else first.time_until_next_call() / S_TO_NS
+        left = [(timer.time_until_next_call(), timer) for node in self._nodes for timer in node.timers]
+        # If only messages advance the clock, waiting for a time is of no use: messages wake the executor.
+        timers = [(due, timer) for due, timer in left if due <= 0 or not timer.clock.is_driven]
+        due, first = min(timers, key=lambda each: each[0], default=(float("inf"), None))
+        return first, due / S_TO_NS
 
 
 class SingleThreadedExecutor(Executor):

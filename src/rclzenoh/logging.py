@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -46,13 +47,33 @@ class Logger:
             if last is not None and now - last < throttle_duration_sec:
                 return False
             self._seen[text] = now
+        # The caller is the first frame outside of this module; frames of `info` and similar methods are skipped.
+        caller = sys._getframe(1)
+        while caller.f_back is not None and caller.f_code.co_filename == __file__:
+            caller = caller.f_back
+        code = caller.f_code
+        return self.log_from((os.path.abspath(code.co_filename), code.co_name, caller.f_lineno), text, severity)
+
+    def log_from(self, place: tuple[str, str, int], text: str, severity: LoggingSeverity) -> bool:
+        """Log a message that comes from another place than the caller: absolute path of the source, function, line."""
         stamp = time.time_ns()
         line = f"[{severity.name}] [{stamp // S_TO_NS}.{stamp % S_TO_NS:09d}] [{self.name}]: {text}\n"
         # One call writes the whole line, also while other threads log.
         sys.stderr.write(line)
         sys.stderr.flush()
         if self.sink is not None:
-            self.sink(Log(stamp=Time(nanoseconds=stamp).to_msg(), level=int(severity), name=self.name, msg=text))
+            file, function, number = place
+            self.sink(
+                Log(
+                    stamp=Time(nanoseconds=stamp).to_msg(),
+                    level=int(severity),
+                    name=self.name,
+                    msg=text,
+                    file=file,
+                    function=function,
+                    line=number,
+                )
+            )
         return True
 
     def info(self, message: object, *, throttle_duration_sec: float | None = None) -> bool:

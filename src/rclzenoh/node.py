@@ -11,22 +11,24 @@ from rclzenoh.endpoint import Endpoint
 from rclzenoh.exceptions import InvalidHandle
 from rclzenoh.interfaces import AnyMessage, Message
 from rclzenoh.interfaces import Service as ServiceType
-from rclzenoh.interfaces.msg import Log, ParameterEvent, SetParametersResult
+from rclzenoh.interfaces.msg import Clock, Log, ParameterEvent
 from rclzenoh.keys import EntityKind
 from rclzenoh.node_base import NodeBase
 from rclzenoh.node_parameters import NodeParameters
 from rclzenoh.parameter import Parameter
 from rclzenoh.qos import (
     QoSProfile,
+    ReliabilityPolicy,
     qos_profile_parameter_events,
     qos_profile_parameters,
     qos_profile_rosout,
     qos_profile_services_default,
 )
 from rclzenoh.service import Client, Service
-from rclzenoh.time import S_TO_NS, Timer
+from rclzenoh.time import S_TO_NS, Time, Timer
 from rclzenoh.topic import Publisher, Subscription
 
+_CLOCK_TOPIC = "/clock"
 _USE_SIM_TIME = "use_sim_time"
 
 _E = TypeVar("_E", bound=Endpoint)
@@ -64,10 +66,11 @@ class Node(NodeBase, NodeParameters):
         self._parameter_events = self.create_publisher(
             ParameterEvent, "/parameter_events", qos_profile_parameter_events
         )
-        self.add_on_set_parameters_callback(_refuse_simulated_time)
+        self._clock_subscription: Subscription | None = None
+        self.add_post_set_parameters_callback(self._choose_clock)
         self.declare_parameter(_USE_SIM_TIME, False)
         if start_parameter_services:
-            for service, name, field, find in self.parameter_services():
+            for service, name, field, find in self.parameter_services(self._logger.warning):
                 answer = partial(_answer, field, find)
                 self.create_service(service, f"~/{name}", answer, qos_profile=qos_profile_parameters)
         if is_taken:
@@ -114,8 +117,8 @@ class Node(NodeBase, NodeParameters):
         return self._keep(Client(self, srv_type, srv_name))
 
     def create_timer(self, timer_period_sec: float, callback: Callable[[], Any]) -> Timer:
-        """Make a timer, which runs in real time; the callback may be a coroutine function."""
-        timer = Timer(callback, int(timer_period_sec * S_TO_NS))
+        """Make a timer on the node's clock, so that simulated time counts; the callback may be a coroutine function."""
+        timer = Timer(callback, int(timer_period_sec * S_TO_NS), self._clock)
         self.timers.append(timer)
         # A waiting executor does not know of this timer and may wait too long, so it is woken.
         self.mailbox.submit(None)
@@ -157,11 +160,23 @@ class Node(NodeBase, NodeParameters):
         except InvalidHandle:
             self._logger.sink = None  # The node or its session has ended; standard error has the message anyway.
 
+    def _choose_clock(self, parameters: list[Parameter]) -> None:
+        """Set the clock by the topic ``/clock`` while the parameter ``use_sim_time`` is true."""
+        for parameter in parameters:
+            active = bool(parameter.value)
+            # A node that sets its clock itself goes on if it is asked for what it does already.
+            if parameter.name != _USE_SIM_TIME or active == (self._clock_subscription is not None):
+                continue
+            self._clock.activate(active)
+            if self._clock_subscription is None:
+                qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+                self._clock_subscription = self.create_subscription(Clock, _CLOCK_TOPIC, self._take_clock, qos)
+            else:
+                self.destroy_subscription(self._clock_subscription)
+                self._clock_subscription = None
 
-def _refuse_simulated_time(parameters: list[Parameter]) -> SetParametersResult:
-    """Refuse `use_sim_time`: names cannot be remapped here, and no simulation but one in the root has ``/clock``."""
-    refused = any(parameter.name == _USE_SIM_TIME and parameter.value for parameter in parameters)
-    return SetParametersResult(successful=not refused, reason=f"{_USE_SIM_TIME}: this node does not follow /clock")
+    def _take_clock(self, message: Clock) -> None:
+        self._clock.set_ros_time_override(Time.from_msg(message.clock))
 
 
 def _answer(field: str, find: Callable[[AnyMessage], object], request: AnyMessage, response: AnyMessage) -> AnyMessage:

@@ -33,7 +33,7 @@ from rclzenoh.interfaces.srv import (
 from rclzenoh.parameter import Parameter, ParameterKind
 
 _RELATIVE_TOLERANCE = 1e-6
-"""A value this close to a bound of its range counts as equal to it; rclpy has the same tolerance."""
+"""A value this close to a bound or a step of its range counts as equal to it; rclpy has the same tolerance."""
 
 
 class NodeParameters:
@@ -125,8 +125,10 @@ class NodeParameters:
         nested = dict.fromkeys(name.rpartition(".")[0] for name in names if "." in name)
         return ListParametersResult(names=names, prefixes=list(nested))
 
-    def parameter_services(self) -> Iterator[tuple[type[Service], str, str, Callable[[AnyMessage], object]]]:
-        """Services by which other nodes read and change the parameters.
+    def parameter_services(
+        self, warn: Callable[[str], object]
+    ) -> Iterator[tuple[type[Service], str, str, Callable[[AnyMessage], object]]]:
+        """Services by which other nodes read and change the parameters; ``warn`` logs why a request fails.
 
         Each has its type, its name, the field of the response, and a function of the request that gives this field. A
         request that names an unknown parameter is answered with an empty list, as rclpy's nodes do.
@@ -135,11 +137,12 @@ class NodeParameters:
         def read_each(names: list[str], read: Callable[[str], object]) -> list[object]:
             try:
                 return [read(name) for name in names]
-            except (KeyError, ParameterException):
+            except ParameterException as error:
+                warn(f"parameter service: {error}")
                 return []
 
         def find_type(name: str) -> int:
-            return int(self._parameters[name].type_.value)
+            return int(self.get_parameter(name).type_.value)
 
         def find_value(name: str) -> ParameterValue:
             return self.get_parameter(name).get_parameter_value()
@@ -151,6 +154,7 @@ class NodeParameters:
             try:
                 return self.set_parameters_atomically([Parameter.from_parameter_msg(message) for message in messages])
             except (ParameterException, ValueError) as error:
+                warn(f"parameter service: {error}")
                 return SetParametersResult(successful=False, reason=str(error))
 
         describe, list_names = self.describe_parameter, self.list_parameters
@@ -207,9 +211,17 @@ def find_refusal(parameter: Parameter, descriptor: ParameterDescriptor, *, is_de
         ParameterKind.INTEGER: descriptor.integer_range,
         ParameterKind.DOUBLE: descriptor.floating_point_range,
     }
+    is_integer, value = parameter.type_ is ParameterKind.INTEGER, parameter.value
+
+    def is_at(mark: float) -> bool:
+        return bool(value == mark if is_integer else math.isclose(value, mark, rel_tol=_RELATIVE_TOLERANCE))
+
     for span in ranges.get(parameter.type_, ()):
         low, high = sorted((span.from_value, span.to_value))
-        near = any(math.isclose(parameter.value, bound, rel_tol=_RELATIVE_TOLERANCE) for bound in (low, high))
-        if not (low <= parameter.value <= high or (near and parameter.type_ is ParameterKind.DOUBLE)):
-            return f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {parameter.value}"
+        if not (low < value < high or is_at(low) or is_at(high)):
+            return f"Parameter {parameter.name} out of range. Min: {low}, max: {high}, value: {value}"
+        if span.step and not is_at(high):
+            steps = (value - low) // span.step if is_integer else round((value - low) / span.step)
+            if not is_at(low + steps * span.step):
+                return f"{value} of parameter {parameter.name} is no step of {span.step} from {low}"
     return None

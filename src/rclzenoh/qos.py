@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
+
+from rclzenoh.time import S_TO_NS, Duration, Infinite
 
 
 class HistoryPolicy(IntEnum):
@@ -35,21 +37,39 @@ class DurabilityPolicy(IntEnum):
     BEST_AVAILABLE = 4
 
 
+class LivelinessPolicy(IntEnum):
+    """How a publisher shows that it is alive."""
+
+    SYSTEM_DEFAULT = 0
+    AUTOMATIC = 1
+    MANUAL_BY_TOPIC = 3
+    UNKNOWN = 4
+    BEST_AVAILABLE = 5
+
+
 @dataclass(kw_only=True)
 class QoSProfile:
-    """Policies of one endpoint; rclpy has more of them, which rmw_zenoh_cpp announces and does not apply.
+    """Policies of one endpoint.
 
     Attributes:
         depth: Messages kept with `HistoryPolicy.KEEP_LAST`; 0 leaves it to the middleware, which keeps 42.
         history: How many messages are kept.
         reliability: Whether messages may be lost.
         durability: Whether subscriptions that join late get earlier messages.
+        lifespan: Age at which a message expires; announced only.
+        deadline: Longest time between two messages; announced only.
+        liveliness: How a publisher shows that it is alive; announced only.
+        liveliness_lease_duration: Time within which it must do so; announced only.
     """
 
     depth: int | None = None
     history: HistoryPolicy | None = None
     reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE
     durability: DurabilityPolicy = DurabilityPolicy.VOLATILE
+    lifespan: Duration = field(default_factory=Duration)
+    deadline: Duration = field(default_factory=Duration)
+    liveliness: LivelinessPolicy = LivelinessPolicy.SYSTEM_DEFAULT
+    liveliness_lease_duration: Duration = field(default_factory=Duration)
 
     def __post_init__(self) -> None:
         if self.history is None and self.depth is None:
@@ -84,13 +104,17 @@ _RCL_DEPTH, _MIDDLEWARE_DEPTH = 10, 42
 def encode(profile: QoSProfile) -> str:
     """Profile as the last chunk of a liveliness token; values that are the middleware's defaults are left empty.
 
-    It reads ``reliability:durability:history,depth``, and then deadline, lifespan and liveliness, which are empty.
+    It reads ``reliability:durability:history,depth:deadline:lifespan:liveliness,lease``.
     """
     reliability = _write_number(profile.reliability, ReliabilityPolicy.RELIABLE)
     durability = _write_number(profile.durability, DurabilityPolicy.VOLATILE)
     history = _write_number(profile.history or HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_LAST)
     depth = "" if profile.depth in (0, _MIDDLEWARE_DEPTH) else str(profile.depth)
-    return f"{reliability}:{durability}:{history},{depth}:,:,:,,"
+    liveliness = _write_number(profile.liveliness, LivelinessPolicy.AUTOMATIC)
+    deadline, lifespan, lease = map(
+        _write_seconds, (profile.deadline, profile.lifespan, profile.liveliness_lease_duration)
+    )
+    return f"{reliability}:{durability}:{history},{depth}:{deadline}:{lifespan}:{liveliness},{lease}"
 
 
 def decode(text: str) -> QoSProfile:
@@ -99,20 +123,40 @@ def decode(text: str) -> QoSProfile:
     Raises:
         ValueError: If the chunk is malformed.
     """
-    (reliability, *_), (durability, *_), (history, depth, *_), *_ = (group.split(",") for group in text.split(":"))
+    groups = [group.split(",") for group in text.split(":")]
+    (reliability, *_), (durability, *_), (history, depth, *_), deadline, lifespan, (liveliness, *lease), *_ = groups
     return QoSProfile(
         depth=int(depth or _MIDDLEWARE_DEPTH),
         history=HistoryPolicy(int(history or 1)),
         reliability=ReliabilityPolicy(int(reliability or 1)),
         durability=DurabilityPolicy(int(durability or 2)),
+        lifespan=_read_duration(lifespan),
+        deadline=_read_duration(deadline),
+        liveliness=LivelinessPolicy(int(liveliness or 1)),
+        liveliness_lease_duration=_read_duration(lease),
     )
+
+
+def _read_duration(chunk: list[str]) -> Duration:
+    seconds, nanoseconds, *_ = chunk
+    if not seconds and not nanoseconds:
+        return Infinite
+    total = int(seconds or 0) * S_TO_NS + int(nanoseconds or 0)
+    return Duration(nanoseconds=min(total, Infinite.nanoseconds))
 
 
 def _write_number(policy: IntEnum, default: IntEnum) -> str:
     return "" if policy in (0, default) else str(int(policy))
 
 
+def _write_seconds(duration: Duration) -> str:
+    if duration.nanoseconds == 0 or duration == Infinite:
+        return ","
+    return ",".join(map(str, divmod(duration.nanoseconds, S_TO_NS)))
+
+
 qos_profile_services_default = QoSProfile(depth=10)
 qos_profile_parameters = qos_profile_parameter_events = QoSProfile(depth=1000)
 qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-qos_profile_rosout = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_ROSOUT_LIFESPAN = Duration(nanoseconds=10 * S_TO_NS)
+qos_profile_rosout = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL, lifespan=_ROSOUT_LIFESPAN)

@@ -1,4 +1,4 @@
-"""Times, timers, and the clocks of nodes."""
+"""Times, durations, timers, and the clock of ROS time: the simulation's time if it provides one, or the system's."""
 
 from __future__ import annotations
 
@@ -11,6 +11,24 @@ from rclzenoh.interfaces.msg import Time as TimeMessage
 
 S_TO_NS = 1_000_000_000
 """Nanoseconds in a second."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Duration:
+    """Period of time.
+
+    Attributes:
+        nanoseconds: Its length [ns].
+    """
+
+    nanoseconds: int = 0
+
+    def __str__(self) -> str:
+        return "Infinite" if self == Infinite else f"{self.nanoseconds} nanoseconds"
+
+
+Infinite = Duration(nanoseconds=2**63 - 1)
+"""The longest duration, which stands for no limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,38 +53,58 @@ class Time:
 
 
 class ROSClock:
-    """The clock of a node: the system's, counted from the epoch, or the node's own once it is set."""
+    """A clock of ROS time; real time is counted from the epoch [ns], as is that of a simulation."""
 
     def __init__(self) -> None:
-        self._override: Time | None = None
+        self._override_ns = 0
+        self._active = False
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether only messages advance the clock, so that waiting for a time is of no use."""
+        return self._active
+
+    def activate(self, active: bool) -> None:
+        """Use the simulation's time, or the system's again."""
+        self._active = active
 
     def set_ros_time_override(self, time: Time) -> None:
-        """Show this time until the next one is set."""
-        self._override = time
+        """Set the simulation's time."""
+        self._override_ns = time.nanoseconds
 
     def now(self) -> Time:
-        """Current time."""
-        return Time(nanoseconds=system.time_ns()) if self._override is None else self._override
+        """Current time; 0 while the simulation's time is in use and has not been heard of."""
+        nanoseconds = self._override_ns if self._active else system.time_ns()
+        return Time(nanoseconds=nanoseconds)
+
+    def timer_now_ns(self) -> int:
+        """Time by which timers run [ns]; in real time, that of a steady clock, as the system's may be corrected."""
+        return self._override_ns if self._active else system.monotonic_ns()
 
 
 class Timer:
-    """Calls back once a period of a steady clock; periods that were missed are skipped."""
+    """Calls back once a period of its clock; periods that were missed are skipped."""
 
-    def __init__(self, callback: Callable[[], Any], timer_period_ns: int) -> None:
+    def __init__(self, callback: Callable[[], Any], timer_period_ns: int, clock: ROSClock) -> None:
         self.callback = callback
         self.timer_period_ns = timer_period_ns
-        self._next = system.monotonic_ns() + timer_period_ns
+        self.clock = clock
+        self._next = clock.timer_now_ns() + timer_period_ns
 
     def time_until_next_call(self) -> int:
         """Time left [ns], not positive when due."""
-        return self._next - system.monotonic_ns()
+        now = self.clock.timer_now_ns()
+        if self._next - now > self.timer_period_ns:
+            # The clock has jumped back, or has changed between simulated and real time, so `_next` is meaningless.
+            self._next = now + self.timer_period_ns
+        return self._next - now
 
     def advance(self) -> None:
         """Begin the next period; called before the callback."""
+        now = self.clock.timer_now_ns()
         self._next += self.timer_period_ns
-        late = -self.time_until_next_call()
-        if late >= 0 and self.timer_period_ns:
-            self._next += (late // self.timer_period_ns + 1) * self.timer_period_ns
+        if self._next <= now and self.timer_period_ns:
+            self._next += (now - self._next) // self.timer_period_ns * self.timer_period_ns + self.timer_period_ns
 
 
 def deadline_after(timeout_s: float | None) -> float:

@@ -47,6 +47,7 @@ def test_endpoint_infos_of_a_topic_look_like_those_of_genuine_nodes(rig):
     assert (offered.reliability.name, offered.durability.name) == ("RELIABLE", "TRANSIENT_LOCAL")
     # DDS does not announce the history of an endpoint.
     assert ON_DDS or (offered.history.name, offered.depth) == ("KEEP_LAST", 3)
+    assert str(offered.lifespan) == str(offered.deadline) == str(offered.liveliness_lease_duration) == "Infinite"
     (info,) = seen.get_subscriptions_info_by_topic("/ns/t")
     assert info.qos_profile.reliability.name == "BEST_EFFORT"
 

@@ -1,6 +1,7 @@
 """Names, log messages and the end of a node."""
 
 import re
+from pathlib import Path
 
 import pytest
 
@@ -35,6 +36,8 @@ def test_log_messages_go_to_standard_error_and_rosout(rig, capfd):
         Log.WARN[0] if isinstance(Log.WARN, bytes) else Log.WARN,
         "careful",
     )
+    assert (heard[0].file, heard[0].function) == (__file__, "test_log_messages_go_to_standard_error_and_rosout")
+    assert "careful" in Path(__file__).read_text(encoding="utf-8").splitlines()[heard[0].line - 1]
     lines = capfd.readouterr().err.splitlines()
     assert len(lines) == 1
     assert lines[0].startswith("[WARN] [")

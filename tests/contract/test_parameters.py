@@ -75,9 +75,9 @@ def test_a_value_must_be_of_the_type_that_is_given():
         Parameter("p", Parameter.Type.DOUBLE, 1)
 
 
-@pytest.mark.parametrize(("value", "allowed"), [(0, True), (10, True), (-1, False), (11, False)])
-def test_integer_ranges_have_bounds(node, value, allowed):
-    descriptor = ParameterDescriptor(integer_range=[IntegerRange(from_value=0, to_value=10)])
+@pytest.mark.parametrize(("value", "allowed"), [(0, True), (10, True), (4, True), (5, False), (-2, False), (12, False)])
+def test_integer_ranges_have_bounds_and_steps(node, value, allowed):
+    descriptor = ParameterDescriptor(integer_range=[IntegerRange(from_value=0, to_value=10, step=2)])
     node.declare_parameter("a", 2, descriptor)
     result = node.set_parameters([Parameter("a", value=value)])[0]
     assert result.successful == allowed
@@ -85,10 +85,11 @@ def test_integer_ranges_have_bounds(node, value, allowed):
 
 
 @pytest.mark.parametrize(
-    ("value", "allowed"), [(0.0, True), (1.0, True), (1.0000001, True), (1.1, False), (float("nan"), False)]
+    ("value", "allowed"),
+    [(0.0, True), (1.0000001, True), (0.3, True), (0.35, False), (1.1, False), (float("nan"), False)],
 )
-def test_floating_point_ranges_have_bounds(node, value, allowed):
-    descriptor = ParameterDescriptor(floating_point_range=[FloatingPointRange(from_value=0.0, to_value=1.0)])
+def test_floating_point_ranges_have_bounds_and_steps(node, value, allowed):
+    descriptor = ParameterDescriptor(floating_point_range=[FloatingPointRange(from_value=0.0, to_value=1.0, step=0.1)])
     node.declare_parameter("a", 0.5, descriptor)
     assert node.set_parameters([Parameter("a", value=value)])[0].successful == allowed
 

@@ -119,8 +119,7 @@ def test_the_controllers_are_named_as_on_the_robot() -> None:
 
 def test_endpoints_have_the_quality_of_service_of_genuine_nodes(robot: Robot) -> None:
     expected = {
-        # Genuine nodes announce a lifespan of 10 s, which rmw_zenoh_cpp does not apply.
-        "/rosout": ":1:,1000:,:,:,,",
+        "/rosout": ":1:,1000:,:10,0:,,",
         "/parameter_events": "::,1000:,:,:,,",
         "/sim_0/sim_0/set_parameters": "::,1000:,:,:,,",
         "/sim_0/reset_simulation": "::,10:,:,:,,",

@@ -1,6 +1,7 @@
 """Log messages of a simulation on /rosout: their place in the sources, and how often they come."""
 
 import signal
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -22,13 +23,15 @@ def settle(robot: Robot) -> None:
         robot.state()
 
 
-def test_a_refused_goal_logs_one_line(robot: Robot) -> None:
+def test_a_refused_goal_logs_one_line_with_its_place_in_the_sources(robot: Robot) -> None:
     with robot.listening(Log, "/rosout") as heard:
         for _ in range(3):
             assert not robot.send(goal(ARM, 0.0)).accepted
         settle(robot)
     lines = find_logged(heard, "not strictly increasing")
     assert len(lines) == 3
+    assert (Path(lines[0].file).name, lines[0].function) == ("controller.py", "_find_refusal")
+    assert lines[0].line > 0
 
 
 @pytest.mark.parametrize("way", ["a client", "SIGTERM"])

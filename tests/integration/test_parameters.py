@@ -62,7 +62,7 @@ def test_descriptions_of_parameters_come_from_the_configuration(robot: Robot) ->
 @pytest.mark.parametrize("node", [None, ARM, "controller_manager"])
 def test_nodes_of_a_simulation_take_no_time_from_others(robot: Robot, node: str | None) -> None:
     refused = robot.set({"use_sim_time": True}, node=node)
-    assert (refused.successful, refused.reason) == (False, "use_sim_time: this node does not follow /clock")
+    assert (refused.successful, refused.reason) == (False, "use_sim_time: this node makes its time itself")
     # A dumped file of parameters says so.
     assert robot.set({"use_sim_time": False}, node=node).successful
     handle = robot.send(goal(ARM, 0.1))

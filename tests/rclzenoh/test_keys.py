@@ -59,6 +59,7 @@ def test_an_enclave_is_part_of_the_token():
         "@ros2_lv/0/1a/0/0/XX/%/%/n",
         "@ros2_lv/0/1a/0/0/MP/%/%/n",
         "@ros2_lv/0/1a/0/0/MP/%/%/n/%t/type/hash/nonsense",
+        "@ros2_lv/0/1a/0/0/MP/%/%/n/%t/type/hash/::,10:,:x,:,,",
         "@ros2_lv/0/1a/0/0/NN//%/n",
         "other/0/1a/0/0/NN/%/%/n",
     ],

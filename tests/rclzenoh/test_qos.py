@@ -4,11 +4,13 @@ from rclzenoh import qos
 from rclzenoh.qos import (
     DurabilityPolicy,
     HistoryPolicy,
+    LivelinessPolicy,
     QoSProfile,
     ReliabilityPolicy,
     decode,
     encode,
 )
+from rclzenoh.time import Duration, Infinite
 
 _SYSTEM_DEFAULT = QoSProfile(
     depth=0,
@@ -25,12 +27,22 @@ _SYSTEM_DEFAULT = QoSProfile(
         (QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT), "2::,5:,:,:,,"),
         (_SYSTEM_DEFAULT, "::,:,:,:,,"),
         (qos.qos_profile_action_status_default, ":1:,1:,:,:,,"),
-        (qos.qos_profile_rosout, ":1:,1000:,:,:,,"),
+        (qos.qos_profile_rosout, ":1:,1000:,:10,0:,,"),
         (qos.qos_profile_parameters, "::,1000:,:,:,,"),
         (QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT), "2::,1:,:,:,,"),
         (QoSProfile(depth=0, history=HistoryPolicy.KEEP_ALL), "::2,:,:,:,,"),
         (QoSProfile(depth=42), "::,:,:,:,,"),
-        (QoSProfile(depth=1, durability=DurabilityPolicy.BEST_AVAILABLE), ":4:,1:,:,:,,"),
+        (QoSProfile(depth=1, deadline=Infinite, lifespan=Infinite), "::,1:,:,:,,"),
+        (QoSProfile(depth=1, deadline=Duration(nanoseconds=1_500_000_000)), "::,1:1,500000000:,:,,"),
+        (
+            QoSProfile(
+                depth=1,
+                durability=DurabilityPolicy.BEST_AVAILABLE,
+                liveliness=LivelinessPolicy.MANUAL_BY_TOPIC,
+                liveliness_lease_duration=Duration(nanoseconds=2_000_000_000),
+            ),
+            ":4:,1:,:,:3,2,0",
+        ),
     ],
 )
 def test_profiles_are_written_as_rmw_zenoh_does(profile, text):
@@ -42,6 +54,9 @@ def test_a_profile_is_read_with_the_defaults_of_the_middleware():
     profile = decode(":1:,:,:10,0:3,2,5")
     assert (profile.reliability, profile.durability) == (ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
     assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 42)
+    assert (profile.deadline, profile.lifespan) == (Infinite, Duration(nanoseconds=10_000_000_000))
+    assert profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+    assert profile.liveliness_lease_duration == Duration(nanoseconds=2_000_000_005)
 
 
 def test_history_or_depth_is_required():

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import rclzenoh.context
 from rclzenoh.action.client import ActionClient, get_action_names_and_types
 from rclzenoh.action.server import ActionServer, CancelResponse, GoalResponse
@@ -13,6 +15,7 @@ from rclzenoh.executors import Executor, SingleThreadedExecutor
 from rclzenoh.interfaces import deserialize as deserialize_message
 from rclzenoh.interfaces import get_action, get_message, get_service
 from rclzenoh.interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclzenoh.logging import LoggingSeverity
 from rclzenoh.node import Node
 from rclzenoh.parameter import Parameter, parameter_value_to_python
 from rclzenoh.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -55,12 +58,26 @@ def let_callbacks_wait(_node: Node) -> None:
     """Let a node go on with other callbacks while one of its coroutines waits; on this backend, all nodes do so."""
 
 
+def pass_on_log(node: Node, record: logging.LogRecord) -> None:
+    """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
+    place = (record.pathname, record.funcName or "", record.lineno)
+    node.get_logger().log_from(place, record.getMessage(), LoggingSeverity(record.levelno))
+
+
 def provide_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``.
 
-    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``.
+    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``, and
+    the time of the system afterwards.
     """
-    node.get_clock().set_ros_time_override(Time())
+    node.get_clock().activate(True)
+    node.add_on_set_parameters_callback(_refuse_other_time)
+
+
+def _refuse_other_time(parameters: list[Parameter]) -> SetParametersResult:
+    if any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters):
+        return SetParametersResult(successful=False, reason="use_sim_time: this node makes its time itself")
+    return SetParametersResult(successful=True)
 
 
 def spin_some(executor: Executor, timeout_sec: float) -> None:

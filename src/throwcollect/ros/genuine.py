@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import os
 import threading
 import traceback
@@ -194,16 +195,31 @@ def _is_of_request(error: BaseException) -> bool:
     return isinstance(error, ValueError) and not any(name.startswith("throwcollect.") for name in modules)
 
 
+def pass_on_log(node: Node, record: logging.LogRecord) -> None:
+    """Log a record of Python's own logging under a node's name and with the place that the record comes from."""
+    # The node's logger would give this line as the place of the record.
+    rclpy_implementation.rclpy_logging_rcutils_log(
+        record.levelno,
+        node.get_logger().name,
+        record.getMessage(),
+        record.funcName,
+        record.pathname,
+        record.lineno,
+    )
+
+
 def provide_time(node: Node) -> None:
     """Make a node the source of its own time: its clock shows the last ``set_ros_time_override``.
 
-    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``.
+    The node refuses `use_sim_time`, with which it would show the time of the publisher of ``/clock``, and
+    the time of the system afterwards.
     """
     # rclpy's own time source does it like this; there is no public function for it.
     node.get_clock()._set_ros_time_is_active(True)
-    node.add_on_set_parameters_callback(_refuse_simulated_time)
+    node.add_on_set_parameters_callback(_refuse_other_time)
 
 
-def _refuse_simulated_time(parameters: list[Parameter]) -> SetParametersResult:
-    refused = any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters)
-    return SetParametersResult(successful=not refused, reason="use_sim_time: this node does not follow /clock")
+def _refuse_other_time(parameters: list[Parameter]) -> SetParametersResult:
+    if any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters):
+        return SetParametersResult(successful=False, reason="use_sim_time: this node makes its time itself")
+    return SetParametersResult(successful=True)

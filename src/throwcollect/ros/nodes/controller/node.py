@@ -8,7 +8,7 @@ import time
 
 from throwcollect.control.controller import REPEATED
 from throwcollect.control.values import ControllerState
-from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, provide_time
+from throwcollect.ros import DurabilityPolicy, Node, QoSProfile, pass_on_log, provide_time
 from throwcollect.ros.msg import ControllerState as ControllerDescription
 from throwcollect.ros.msg import JointTrajectory, JointTrajectoryControllerState, SpeedScalingFactor
 from throwcollect.ros.nodes.controller.action import ControllerAction, nanoseconds, read_trajectory, state_message
@@ -119,14 +119,7 @@ class _LogHandler(logging.Handler):
             if now_s < self._passed_on_s.get(about, -math.inf) + _REPEATED_S:
                 return
             self._passed_on_s[about] = now_s
-        log, text = self._node.get_logger(), record.getMessage()
-        # rclpy allows one severity for each line that logs.
-        if record.levelno >= logging.ERROR:
-            log.error(text)
-        elif record.levelno >= logging.WARNING:
-            log.warning(text)
-        else:
-            log.info(text)
+        pass_on_log(self._node, record)
 
 
 class ControllerManager(Node):
