@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from contextlib import closing, suppress
 from dataclasses import replace
@@ -30,7 +31,7 @@ from throwcollect.files import check_regular, remove, write_file
 from throwcollect.plan.plan import Plan
 from throwcollect.plan.point_file import encode_points
 from throwcollect.plan.trials import Points
-from throwcollect.tasks.result import LOST
+from throwcollect.tasks.result import LOST, REFUSED, Result
 from throwcollect.wording import command
 
 _NO_EPISODE = "no whole episode of it was left"
@@ -251,14 +252,8 @@ def finish_without_simulating(
 ) -> None:
     """Finish a dataset with the episodes that are whole, and give all other trials up as lost; else as `resume`.
 
-    A finished dataset of which nothing is missing or damaged stays as it is. One with `until` is refused, because
-    where it ends depends on the trials that are missing.
+    A finished dataset of which nothing is missing or damaged stays as it is.
     """
-    if config.until is not None:
-        raise ConfigError(
-            [Problem(f"{directory} ends by its results, so it cannot be finished without simulating", key="until")],
-            hint=command("resume", directory),
-        )
     plan = resume(config, directory, sweep_directory=sweep_directory, reporter=reporter)
     if (directory / METADATA).exists():
         reporter.say(f"{directory}: is finished, and no file of it is missing or damaged")
@@ -266,9 +261,28 @@ def finish_without_simulating(
     provenance, rows = read_provenance(directory), {}
     with suppress(DatasetError):
         rows = {row["trial"]: row for row in read_throws_table(directory / THROWS, plan).to_pylist()}
+    there: list[int] = []
+    wanted = math.inf if plan.config.until is None else plan.config.until.wanted
+
+    def keep(trial: int, result: Result) -> bool:
+        """Note an episode; with `until`, drop those that follow the last trial that is wanted."""
+        nonlocal wanted
+        if wanted <= 0:
+            return False
+        there.append(trial)
+        wanted -= result.outcome.value == plan.config.task.success
+        return True
+
     with closing(DatasetWriter.open(directory)) as writer:
-        writer.recover(lambda *_: True)
+        writer.recover(keep)
+        known = {trial: row["reason"] for trial, row in rows.items() if row["outcome"] in (LOST, REFUSED)}
+        if plan.config.until is not None:
+            # Where the dataset ends without the missing trials is not known, so it ends with the last known one.
+            last = max([*there, *(rows if wanted > 0 else ())], default=plan.trials.first)
+            for trial in writer.list_missing():
+                if trial in known and rows[trial]["outcome"] == REFUSED:
+                    writer.refuse(trial, known[trial])
+            writer.end_with(last)
         for trial in writer.list_missing():
-            row = rows.get(trial, {})
-            writer.append_lost(trial, row["reason"] if row.get("outcome") == LOST else _NO_EPISODE)
+            writer.append_lost(trial, known.get(trial, _NO_EPISODE))
         writer.finish(provenance=provenance)

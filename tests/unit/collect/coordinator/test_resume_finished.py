@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -17,7 +18,6 @@ from throwcollect.dataset.creation import create
 from throwcollect.dataset.provenance import read_provenance
 from throwcollect.dataset.verify import verify
 from throwcollect.dataset.writer import DatasetWriter
-from throwcollect.errors import ConfigError
 from throwcollect.tasks.throw.throw_result import ThrowResult
 
 TRIALS = 4
@@ -178,7 +178,19 @@ def test_a_damaged_configuration_is_an_error_or_is_restored(
     assert contents(dataset) == contents(sound)
 
 
-def test_a_dataset_with_until_is_not_finished_without_simulating(tmp_path: Path) -> None:
-    config = Collection({"until": {"landed": 4}}).config
-    with pytest.raises(ConfigError, match=r"until: .* ends by its results"):
-        finish_without_simulating(config, tmp_path, sweep_directory=tmp_path)
+@pytest.mark.parametrize(("name", "lost"), [("plan.parquet", []), ("throws.parquet", []), ("quick_00001.mcap", [3])])
+def test_finishing_without_simulating_ends_a_dataset_with_until_where_it_ended(
+    tmp_path: Path, name: str, lost: list[int]
+) -> None:
+    collection, directory = Collection({"until": {"landed": 4}}), tmp_path / "dataset"
+    create(directory, collection.plan)
+    with closing(DatasetWriter.open(directory)) as writer:
+        collection.fill(writer, range(4))
+        writer.end_with(3)
+        writer.finish()
+    before = contents(directory)
+    (directory / name).unlink()
+    finish_without_simulating(collection.config, directory, sweep_directory=directory)
+    rows = pq.read_table(directory / "throws.parquet").to_pylist()
+    assert [row["outcome"] for row in rows] == ["lost" if number in lost else "landed" for number in range(4)]
+    assert lost or contents(directory) == before
