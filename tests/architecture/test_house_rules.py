@@ -17,7 +17,7 @@ LONGEST_MODULE = 400
 LONGEST_FUNCTION = 60
 LONGEST_TEST = 500
 """Most lines of a module of tests; longer modules had several subjects."""
-CEILING = 56_731
+CEILING = 56_747
 """Most lines of Python in `src`. Every commit that deletes lowers it; see CONTRIBUTING.md for what may be added."""
 
 

@@ -59,6 +59,7 @@ class LiveSimulator(Simulator):
     Attributes:
         state: Whether the clock may run.
         real_time_factor: Simulated over real time [-]; None for no limit.
+        shows_trial: Whether the world holds the samples of a leased trial, which may have ended; a reset drops them.
     """
 
     def __init__(self, config: Config, on_frame: Callable[[], None] = lambda: None) -> None:
@@ -90,12 +91,13 @@ class LiveSimulator(Simulator):
     def begin(self, number: int, values: Values, *, seed: int = 0, target: Values = NO_TARGET) -> None:
         """Begin a trial; see `Simulator.begin`."""
         super().begin(number, values, seed=seed, target=target)
+        self.shows_trial = True
         self._begin_motion()
 
     def reset(self, *, time: bool = True, state: bool = True) -> None:
         """Go back to the start, in whole or in part; see `Simulator.reset`."""
         self._interrupt_steps("the simulation was reset")
-        self._running = False
+        self._running = self.shows_trial = False
         self._published = 0
         self._has_start &= not state
         super().reset(time=time, state=state)

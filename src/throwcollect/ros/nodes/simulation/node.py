@@ -191,7 +191,7 @@ class SimulationNode(Node):
     def _rests(self) -> bool:
         """Whether time stands still for lack of work; never during a trial, of which each sample is published once."""
         simulation = self._simulation
-        return simulation.state == StateCode.PLAYING and not simulation.running and not simulation.trial.leased
+        return simulation.state == StateCode.PLAYING and not simulation.running and not simulation.shows_trial
 
     def _publish_steps(self, samples: Samples) -> None:
         """Publish the time after the steps of a paused simulation, because they may end between two samples."""
