@@ -87,6 +87,8 @@ def test_a_client_notices_its_service_and_no_other(rig):
     other.create_service(Trigger, "/other", lambda _request, response: response)
     service = other.create_service(Trigger, "/s", lambda _request, response: response)
     assert client.wait_for_service(30)
+    # The client asks for the present state, and hears of the change in another thread.
+    assert rig.spin(lambda: node.context.graph.changes > before)
     settle(other, node)
     assert node.context.graph.changes == before + 1
     other.destroy_service(service)
